@@ -25,6 +25,7 @@ class FixedInC {
  public:
   FixedInC(const Folder& folder, const CCode& code, const std::string& compiler = "gcc -std=c99",
            bool controls = false) {
+    const bool opens = !code.settings.empty();
     static int count = 0;
     folder.write("eso.h", code.header);
     folder.write("eso.c", code.source);
@@ -45,6 +46,11 @@ class FixedInC {
       find(update, "eso_update");
       find(predict, "eso_predict");
       find(reset, "eso_reset");
+    }
+    if (opens) {
+      find(adopt, "eso_adopt");
+      design = dlsym(handle_, "eso_design");
+      other = dlsym(handle_, "eso_other");
     }
     find(estimate, "eso_estimate");
     find(self_test, "eso_self_test");
@@ -68,7 +74,11 @@ class FixedInC {
   std::int32_t (*miss)(void*, Y) = nullptr;
   void (*applied)(void*, std::int32_t) = nullptr;
   unsigned (*start)(void*, Y, std::int32_t) = nullptr;
-  std::array<std::int32_t, 40> state{};
+  // Of settings in a struct, two sets of which are in the files.
+  unsigned (*adopt)(void*, const void*) = nullptr;
+  const void* design = nullptr;
+  const void* other = nullptr;
+  alignas(8) std::array<std::int32_t, 40> state{};
 
  private:
   template <class F>

@@ -9,6 +9,7 @@
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/core/error_text.hpp>
+#include <esokit/gain/pole_set.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>
@@ -125,6 +126,25 @@ TEST(FixedPoint, OfASettledAlgebraicObserver) {
   for (std::size_t i = 0; i < linear.written.a.size(); ++i) {
     EXPECT_NEAR(settled.written.a[i], linear.written.a[i], 1e-4);
   }
+}
+
+/// A complex pair and a real pole; the written system has their product as its determinant.
+TEST(FixedPoint, OfAPoleSet) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  using Placed = LinearEso<2, double, 1, PoleSet>;
+  Placed::Config config{};
+  config.poles = {{{-70, 40}, {-70, -40}, {-150, 0}}};
+  config.sample_time = 1e-3;
+  config.input_gain = 50;
+  config.max_gap = 5;
+  const auto object = Placed::make(config).value();
+  EXPECT_GT((stays_within<std::int32_t>(object, servo(), 16)), 0.3);
+  const WrittenSystem w = to_fixed_c(object, servo())->written;
+  const auto a = [&](std::size_t i, std::size_t j) { return w.a[3 * i + j]; };
+  const double determinant = a(0, 0) * (a(1, 1) * a(2, 2) - a(1, 2) * a(2, 1)) -
+                             a(0, 1) * (a(1, 0) * a(2, 2) - a(1, 2) * a(2, 0)) +
+                             a(0, 2) * (a(1, 0) * a(2, 1) - a(1, 1) * a(2, 0));
+  EXPECT_NEAR(determinant, std::exp(-(70 + 70 + 150) * 1e-3), 1e-4);  // gains of 12 bits and more
 }
 
 /// The frozen filter has a constant gain, too; one that goes on is refused.
@@ -456,10 +476,162 @@ TEST(FixedPoint, InTheLoopIsAsGoodAsDouble) {
   }
 }
 
+/// Of this bandwidth, for code with settings in a struct; `base` is that code, or null.
+Expected<FixedCode, Error<double>> with_settings(double bandwidth, FixedPointOptions options,
+                                                 const FixedCode* base) {
+  options.code.settings_in_struct = true;
+  options.settings_for = base;
+  if (base != nullptr) options.code.settings_name = "other";
+  return to_fixed_c(observer<LinearEso<2>>(bandwidth, 1e-3), options);
+}
+
+/// The code of `base` with the settings of another design behind it.
+CCode joined(const FixedCode& base, const FixedCode& other) {
+  CCode code = base.code;
+  code.source += other.code.settings;
+  return code;
+}
+
+/// Settings that are adopted make the code that of the other design: within its bounds, from the
+/// first sample on, and back.
+TEST(FixedPoint, AdoptsSettings) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  const auto adopts = [](const FixedPointOptions& options, auto y, std::uint64_t seed,
+                         double slowest) {
+    using Y = decltype(y);
+    const auto base = with_settings(100, options, nullptr);
+    ASSERT_TRUE(base);
+    for (const double bandwidth : {100.0, 70.0, slowest}) {
+      const auto other = with_settings(bandwidth, options, &*base);
+      ASSERT_TRUE(other) << bandwidth << ": " << other.error().rule;
+      EXPECT_EQ(other->written.scale, base->written.scale);
+      const Folder folder;
+      FixedInC<Y> c(folder, joined(*base, *other));
+      ASSERT_TRUE(c.loaded());
+      ASSERT_NE(c.other, nullptr);
+      EXPECT_EQ(c.self_test(), 0);
+      const auto init = c.init;
+      EXPECT_EQ(c.adopt(c.state.data(), c.other), 0u);
+      // The play begins with init: the state as it is then is that with the other settings.
+      static unsigned (*adopt)(void*, const void*);
+      static void (*begin)(void*);
+      static const void* settings;
+      adopt = c.adopt;
+      begin = init;
+      settings = c.other;
+      c.init = [](void* o) {
+        begin(o);
+        (void)adopt(o, settings);
+      };
+      FixedPlay<Y> play(c, *other, options, seed);
+      EXPECT_LE(play.by_chance(many / 4), 1) << bandwidth;
+      double most = 0;
+      for (std::size_t row = 0; row < 3; ++row) {
+        most = std::max(most, play.by_adversary(row, 400, 64));
+      }
+      EXPECT_LE(most, 1) << bandwidth;
+      EXPECT_GT(most, 0.3) << bandwidth;
+      EXPECT_EQ(play.refused, 0);
+      // Of the wrong settings it is out of its bound, if they are others.
+      if (bandwidth < 100) {
+        c.init = begin;
+        FixedPlay<Y> wrong(c, *other, options, seed);
+        EXPECT_GT(wrong.by_chance(2000), 1) << bandwidth;
+      }
+    }
+  };
+  adopts(servo(), std::int32_t{}, 61, 30);
+  adopts(servo(16), std::int32_t{}, 62, 50);
+  adopts(counter(), std::uint16_t{}, 63, 60);
+}
+
+/// Whatever the order of switches, gaps and signs, nothing overflows; a state outside the new range
+/// is held there and reported.
+TEST(FixedPoint, AnySequenceOfSettingsIsDefined) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  const FixedPointOptions options = servo();
+  const auto base = with_settings(100, options, nullptr).value();
+  const auto other = with_settings(30, options, &base).value();
+  const Folder folder;
+  FixedInC<std::int32_t> c(folder, joined(base, other),
+                           "gcc -std=c99 -fsanitize=undefined -fsanitize-undefined-trap-on-error");
+  ASSERT_TRUE(c.loaded());
+  Random random(71);
+  int held = 0;
+  int switches = 0;
+  std::int32_t y = 2048;
+  std::int32_t u = 1000;
+  for (int k = 0; k < 300000; ++k) {
+    if (random.index(20) == 0) y = -y;
+    if (random.index(20) == 0) u = -u;
+    if (random.index(100) == 0) (void)c.predict(c.state.data(), u);
+    if (random.index(30) == 0) {
+      const unsigned status = c.adopt(c.state.data(), random.index(2) == 0 ? c.other : c.design);
+      EXPECT_EQ(status & ~128u, 0u);
+      held += status == 128;
+      ++switches;
+    }
+    (void)c.update(c.state.data(), y, u);
+  }
+  EXPECT_GT(switches, 5000);
+  EXPECT_GT(held, 50);
+  // Of another text.
+  FixedPointOptions coarse = options;
+  coarse.y.most = 1000;
+  const auto foreign = with_settings(30, coarse, nullptr).value();
+  EXPECT_NE(foreign.layout.mark, base.layout.mark);
+  std::uint32_t no_settings[64] = {foreign.layout.mark};
+  const auto before = c.state;
+  EXPECT_EQ(c.adopt(c.state.data(), no_settings), 64u);
+  EXPECT_EQ(c.state, before);
+}
+
+/// A controller takes gains of its law and limits, too.
+TEST(FixedPoint, AControllerAdoptsGainsAndLimits) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  FixedPointOptions options = servo();
+  options.code.settings_in_struct = true;
+  const auto base = to_fixed_c(Servo::make(servo_loop(500)).value(), options).value();
+  auto config = servo_loop(100);
+  config.observer.observer_bandwidth = 60;
+  config.controller_bandwidth = 12;
+  config.limits.lower = -3;
+  config.limits.upper = 6;
+  const auto slow = Servo::make(config).value();
+  options.settings_for = &base;
+  options.code.settings_name = "other";
+  const auto other = to_fixed_c(slow, options).value();
+  const Folder folder;
+  FixedInC<std::int32_t> c(folder, joined(base, other), "gcc -std=c99", true);
+  const Folder apart;
+  FixedInC<std::int32_t> alone(apart, other.code, "gcc -std=c99", true);
+  ASSERT_TRUE(c.loaded() && alone.loaded());
+  EXPECT_EQ(c.adopt(c.state.data(), c.other), 0u);
+  auto in_double = slow;
+  Random random(81);
+  int inside = 0;
+  for (int k = 0; k < 20000; ++k) {
+    const auto r = static_cast<std::int32_t>(20 * std::sin(0.001 * k));
+    const std::int32_t y = r + random.index(5) - 2;
+    const std::int32_t u = c.control(c.state.data(), y, r);
+    // The same lists with the settings as they are written alone, in each bit.
+    ASSERT_EQ(u, alone.control(alone.state.data(), y, r)) << k;
+    ASSERT_LE(u, 500);
+    ASSERT_GE(u, -250);
+    const double wanted = in_double.update(y * options.y.unit, r * options.y.unit);
+    in_double.applied(u * options.u.unit);
+    ASSERT_NEAR(u, wanted / options.u.unit, other.input.deviation + other.input.by_gains + 1);
+    inside += std::abs(u) < 240;
+  }
+  EXPECT_GT(inside, 10000);
+}
+
 /// Other compilers take it, and of MISRA C:2012 nothing is found but the deviations that the file
 /// names.
 TEST(FixedPoint, CompilesWithOtherCompilers) {
-  for (const FixedPointOptions& options : {servo(), counter()}) {
+  auto opens = counter();
+  opens.code.settings_in_struct = true;
+  for (const FixedPointOptions& options : {servo(), counter(), opens}) {
     const auto made = to_fixed_c(Servo::make(servo_loop(500)).value(), options).value();
     const Folder folder;
     folder.write("eso.h", made.code.header);
@@ -550,14 +722,10 @@ TEST(FixedPoint, RefusesWhatIsNotLinear) {
   ASSERT_FALSE(code);
   EXPECT_STREQ(code.error().field, "observer");
   // What is not written says so, and what to take instead.
-  const auto refused = [](const auto& object, bool in_struct = false) {
-    FixedPointOptions options = servo();
-    options.code.settings_in_struct = in_struct;
-    const auto made = to_fixed_c(object, options);
+  const auto refused = [](const auto& object) {
+    const auto made = to_fixed_c(object, servo());
     return made ? std::string() : std::string(made.error().rule);
   };
-  const auto linear = observer<LinearEso<2>>(100, 1e-3);
-  EXPECT_NE(refused(linear, true).find("not written in fixed point"), std::string::npos);
   using Wrapped = WrappedOutput<LinearEso<2>>;
   Wrapped::Config wrapped{};
   wrapped.observer = {
@@ -567,6 +735,30 @@ TEST(FixedPoint, RefusesWhatIsNotLinear) {
   using Told = Measured<LinearEso<2>>;
   EXPECT_NE(refused(Told::make({.observer = wrapped.observer}).value()).find("is in Measured"),
             std::string::npos);
+}
+
+/// Settings that do not fit into the scales, or whose bound is above what is allowed, or of another
+/// structure, are refused.
+TEST(FixedPoint, RefusesSettingsThatDoNotFit) {
+  FixedPointOptions options = servo();
+  options.code.settings_in_struct = true;
+  const auto base = to_fixed_c(observer<LinearEso<2>>(100, 1e-3), options).value();
+  options.settings_for = &base;
+  const auto refusal_of = [&](const auto& object) {
+    const auto made = to_fixed_c(object, options);
+    return made ? std::string() : made.error().field + std::string(": ") + made.error().rule;
+  };
+  const auto at = [](double bandwidth) { return observer<LinearEso<2>>(bandwidth, 1e-3); };
+  EXPECT_EQ(refusal_of(at(50)), "");
+  EXPECT_NE(refusal_of(at(150)).find("settings_for: times what the scales"), std::string::npos);
+  EXPECT_NE(refusal_of(observer<LinearEso<2>>(50, 2e-3)).find("the same name, structure"),
+            std::string::npos);
+  EXPECT_NE(refusal_of(observer<LinearEso<1>>(50, 1e-3)).find("the code of such an object"),
+            std::string::npos);
+  options.most_deviation = {0, 0, 1e-4};
+  EXPECT_EQ(refusal_of(at(50)).substr(0, 15), "most_deviation:");
+  options.code.settings_in_struct = false;
+  EXPECT_EQ(refusal_of(at(50)).substr(0, 19), "settings_in_struct:");
 }
 
 }  // namespace target_fixed_point_test

@@ -34,7 +34,8 @@ template <class Made>
 bool write_fixed(const std::string& folder, const std::string& name, const Made& made,
                  esokit::FixedPointOptions options, int innovation_bits = 32, int samples = 1000) {
   if (!made) return false;
-  options.code = {.name = name, .self_test_samples = samples};
+  options.code.name = name;
+  options.code.self_test_samples = samples;
   options.innovation_bits = innovation_bits;
   const auto code = esokit::to_fixed_c(*made, options);
   if (!code) {
@@ -62,11 +63,14 @@ int main(int argc, char** argv) {
   // 12 bits of y, 1000 counts of u for 5 V.
   const esokit::FixedPointOptions counts{.y = {.unit = 6.2831853 / 4096, .most = 2047},
                                          .u = {.unit = 5.0 / 1000, .most = 1000}};
+  auto opens = counts;
+  opens.code.settings_in_struct = true;
   auto limited = Loop::Config{.observer = config,
                               .controller_bandwidth = 15.0f,
                               .limits = {.lower = -5.0f, .upper = 5.0f, .rate = 500.0f}};
   const bool in_counts = write_fixed(argv[1], "eso_fixed", Eso::make(config), counts) &&
                          write_fixed(argv[1], "eso_fixed16", Eso::make(config), counts, 16) &&
+                         write_fixed(argv[1], "eso_open", Eso::make(config), opens) &&
                          write_fixed(argv[1], "loop_fixed", Loop::make(limited), counts) &&
                          write_fixed(argv[1], "position", drive::Position::make(drive::position()),
                                      drive::position_counts()) &&

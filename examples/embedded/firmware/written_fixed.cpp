@@ -8,6 +8,7 @@
 #include <current.h>
 #include <eso_fixed.h>
 #include <eso_fixed16.h>
+#include <eso_open.h>
 #include <loop_fixed.h>
 #include <position.h>
 
@@ -66,6 +67,7 @@ int run_firmware() {
   using namespace firmware;
   bool fine = agrees("eso_fixed", eso_fixed_self_test());
   fine = agrees("eso_fixed16", eso_fixed16_self_test()) && fine;
+  fine = agrees("eso_open", eso_open_self_test()) && fine;
   fine = agrees("loop_fixed", loop_fixed_self_test()) && fine;
   fine = agrees("position", position_self_test()) && fine;
   fine = agrees("current", current_self_test()) && fine;
@@ -74,6 +76,8 @@ int run_firmware() {
                          Called<eso_fixed_state, unsigned, Plain>::observe<eso_fixed_update>);
   count<eso_fixed16_state>("eso_fixed16", eso_fixed16_init,
                            Called<eso_fixed16_state, unsigned, Plain>::observe<eso_fixed16_update>);
+  count<eso_open_state>("eso_open", eso_open_init,
+                        Called<eso_open_state, unsigned, Plain>::observe<eso_open_update>);
   count<loop_fixed_state>("loop_fixed", loop_fixed_init,
                           Called<loop_fixed_state, Plain, Plain>::control<loop_fixed_update>);
   count<position_state>("position", position_init,

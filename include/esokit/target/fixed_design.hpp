@@ -29,6 +29,8 @@ struct CountedSignal {
                           ///< does not
 };
 
+struct FixedCode;
+
 /// How a design is to be written in fixed point.
 struct FixedPointOptions {
   CountedSignal y{};         ///< the measurement
@@ -40,7 +42,9 @@ struct FixedPointOptions {
   std::vector<double> most_deviation{};
   double most_input_deviation = 0;  ///< the same of u, in counts; 0: a count, or what half a
                                     ///< count of y does
-  CodeOptions code{};               ///< name and comment
+  CodeOptions code{};               ///< name and comment, and whether settings are in a struct
+  const FixedCode* settings_for = nullptr;  ///< with CodeOptions::settings_in_struct: the design is
+                                            ///< for `name_adopt` of this code, with its scales
 };
 
 /// What rounding can do to an estimate or to u.
@@ -62,6 +66,19 @@ struct WrittenSystem {
   std::vector<double> most{};    ///< the largest that y and u can make of state i, in counts
 };
 
+/// What settings that are changed while it runs leave as it is.
+struct FixedLayout {
+  std::vector<int> scale{};      ///< of the states
+  std::vector<bool> keeps{};     ///< which of them keep what is left over
+  bool rounds = false;           ///< shifts round
+  std::map<int, int> coarser{};  ///< scales of what is computed, by its owner
+  std::map<int, int> narrow{};
+  std::map<int, int> left_over{};
+  std::array<std::vector<int>, 2> products{};  ///< scales of the products, of update and law
+  int law_scale = 0;
+  std::uint32_t mark = 0;  ///< of the text
+};
+
 namespace detail {
 
 /// A recorded call as numbers: what is linear in states and arguments, for each instruction.
@@ -69,9 +86,10 @@ class LinearCall {
  public:
   /// @param state_of for each number of the object which state it is, or -1
   /// @param given arguments that are numbers; NaN: the argument is a column
+  /// @param settings which numbers may be changed while it runs, or empty
   LinearCall(const RecordedCall& call, const std::vector<int>& state_of,
              const std::vector<double>& values, std::size_t states,
-             const std::vector<double>& given)
+             const std::vector<double>& given, const std::vector<bool>& settings = {})
       : constant_(states + given.size()) {
     for (const Instruction& one : call.list.instructions) {
       LinearForm form(constant_ + 1, 0.0);
@@ -159,13 +177,24 @@ class LinearCall {
             fine = false;
         }
       }
+      bool changes = false;
+      if (one.operation == Operation::argument) {
+        changes = static_cast<std::size_t>(one.a) < settings.size() &&
+                  settings[static_cast<std::size_t>(one.a)];
+      } else if (one.operation != Operation::constant) {
+        for (const int i : {one.a, one.b, one.c}) {
+          changes = changes || (i >= 0 && varies[static_cast<std::size_t>(i)]);
+        }
+      }
       of.push_back(form);
       linear.push_back(fine);
+      varies.push_back(changes);
     }
   }
 
   std::vector<LinearForm> of{};  ///< states, arguments, the constant
   std::vector<bool> linear{};
+  std::vector<bool> varies{};  ///< with the settings
 
   [[nodiscard]] bool is_constant(int i) const {
     const LinearForm& form = of[static_cast<std::size_t>(i)];
@@ -201,6 +230,20 @@ class FixedDesign {
 
   FixedDesign(const RecordedDesign& design, const FixedPointOptions& options)
       : design_(&design), options_(options), wraps_(options.y.counter_bits > 0) {}
+
+  /// @param given scales and order that settings of this design are to fit into
+  FixedDesign(const RecordedDesign& design, const FixedPointOptions& options,
+              const FixedLayout* given)
+      : FixedDesign(design, options) {
+    given_ = given;
+    if (given == nullptr) return;
+    layout = *given;
+    rounds_ = given->rounds;
+    coarser_ = given->coarser;
+    narrow_scale_ = given->narrow;
+    left_over_scale_ = given->left_over;
+  }
+  FixedLayout layout{};
 
   FixedRefusal refusal{};
 
@@ -281,11 +324,22 @@ class FixedDesign {
   bool make() {
     if (!checks() || !takes_design()) return false;
     std::vector<bool> keeps(states(), false);
+    if (given_ != nullptr) {
+      if (given_->keeps.size() != states() || (given_->law_scale > 0) != design_->is_controller) {
+        return refuse("settings_for", static_cast<double>(states()),
+                      "must be the code of such an object");
+      }
+      keeps = given_->keeps;
+    }
     for (;;) {
       if (!builds(keeps)) return false;
       bounds();
       const int worst = exceeded();
       if (worst < 0) break;
+      if (given_ != nullptr) {
+        refuse_bound(worst);
+        return false;
+      }
       if (!rounds_) {
         rounds_ = true;
         continue;
@@ -308,7 +362,15 @@ class FixedDesign {
     for (std::size_t i = 0; i < estimates.size(); ++i) {
       estimates[i].by_gains = change(exact_estimates_[i], exact_estimates_[i], 0);
     }
-    return !design_->is_controller || law_fits();
+    if (design_->is_controller && !law_fits()) return false;
+    layout.scale = written.scale;
+    layout.keeps = keeps;
+    layout.rounds = rounds_;
+    layout.coarser = coarser_;
+    layout.narrow = narrow_scale_;
+    layout.left_over = left_over_scale_;
+    layout.law_scale = law_scale;
+    return true;
   }
 
  private:
@@ -330,7 +392,7 @@ class FixedDesign {
   }
   [[nodiscard]] LinearCall linear(const RecordedCall& call,
                                   const std::vector<double>& given) const {
-    return {call, state_of_, design_->numbers, states(), given};
+    return {call, state_of_, design_->numbers, states(), given, design_->settings};
   }
 
   bool checks() {
@@ -389,8 +451,8 @@ class FixedDesign {
     if (design_->law.watches) {
       return refuse("outlier_threshold", 1, "is not written in fixed point");
     }
-    if (!design_->settings.empty()) {
-      return refuse("settings_in_struct", 1, "is not written in fixed point");
+    if (options_.settings_for != nullptr && design_->settings.empty()) {
+      return refuse("settings_in_struct", 0, "must be true for settings_for, here and there");
     }
     if (design_->loop.divider > 1) {
       return refuse("measurement_divider", design_->loop.divider, "must be 1 in fixed point");
@@ -525,6 +587,7 @@ class FixedDesign {
   struct Term {
     double coefficient;
     int node;
+    bool varies = false;  ///< with the settings
   };
 
   /// A power of two times a small odd number.
@@ -539,6 +602,10 @@ class FixedDesign {
       }
     }
     return false;
+  }
+
+  static bool is_short(const Term& one, int& odd, int& exponent) {
+    return !one.varies && is_short(one.coefficient, odd, exponent);
   }
 
   /// Builds one recorded call.
@@ -556,6 +623,7 @@ class FixedDesign {
     std::vector<Value> words{};
     std::vector<Value> rests{};
     std::vector<int> narrow{};  ///< lines of 16 bits
+    std::size_t products = 0;
 
     [[nodiscard]] const Instruction& at(int i) const {
       return call->list.instructions[static_cast<std::size_t>(i)];
@@ -564,7 +632,14 @@ class FixedDesign {
       const Operation operation = at(i).operation;
       return operation == Operation::add || operation == Operation::subtract;
     }
-    void collect(int i, double by, bool inside, std::vector<Term>& terms, int open) const {
+    /// Whether a number is short whatever the settings are.
+    [[nodiscard]] bool stays_short(int i) const {
+      int odd = 0;
+      int exponent = 0;
+      return !forms.varies[static_cast<std::size_t>(i)] && is_short(forms.number(i), odd, exponent);
+    }
+    void collect(int i, double by, bool inside, std::vector<Term>& terms, int open,
+                 bool varies = false) const {
       const Instruction& one = at(i);
       if (forms.is_constant(i)) return;
       if (one.operation == Operation::argument ||
@@ -572,19 +647,23 @@ class FixedDesign {
         for (Term& term : terms) {
           if (term.node == i) {
             term.coefficient += by;
+            term.varies = term.varies || varies;
             return;
           }
         }
-        terms.push_back({by, i});
+        terms.push_back({by, i, varies});
       } else if (one.operation == Operation::multiply) {
         const bool first = forms.is_constant(one.a);
-        collect(first ? one.b : one.a, by * forms.number(first ? one.a : one.b), true, terms, open);
+        collect(first ? one.b : one.a, by * forms.number(first ? one.a : one.b), true, terms, open,
+                varies || forms.varies[static_cast<std::size_t>(first ? one.a : one.b)]);
       } else if (one.operation == Operation::divide) {
-        collect(one.a, by / forms.number(one.b), true, terms, open);
+        collect(one.a, by / forms.number(one.b), true, terms, open,
+                varies || forms.varies[static_cast<std::size_t>(one.b)]);
       } else {
-        collect(one.a, one.operation == Operation::negate ? -by : by, true, terms, open);
+        collect(one.a, one.operation == Operation::negate ? -by : by, true, terms, open, varies);
         if (is_sum(i)) {
-          collect(one.b, one.operation == Operation::subtract ? -by : by, true, terms, open);
+          collect(one.b, one.operation == Operation::subtract ? -by : by, true, terms, open,
+                  varies);
         }
       }
     }
@@ -605,10 +684,8 @@ class FixedDesign {
           if (part < 0 || forms.is_constant(part)) continue;
           need[static_cast<std::size_t>(part)] = true;
           ++uses[static_cast<std::size_t>(part)];
-          int odd = 0;
-          int exponent = 0;
           if (one.operation == Operation::multiply &&
-              !is_short(forms.number(forms.is_constant(one.a) ? one.a : one.b), odd, exponent)) {
+              !stays_short(forms.is_constant(one.a) ? one.a : one.b)) {
             uses[static_cast<std::size_t>(part)] += 2;
           }
           // What is multiplied by a short number is used once more.
@@ -633,20 +710,32 @@ class FixedDesign {
     }
 
     /// c v near a scale, as a product with a gain of 12 to 15 bits.
-    Value product(double c, const Value& v, double most, int scale, bool full, bool& negative) {
+    Value product(double c, const Value& v, double most, int scale, bool full, bool varies,
+                  bool& negative) {
       negative = c < 0;
       const bool high = !is_narrow(v) && !(most > 0);
       const int offset = high ? 16 - v.scale : -v.scale;
       const double largest = most > 0 ? std::floor(1073741824.0 / most) : most_gain;
       const double least = most > 0 ? largest / 8 : double{least_gain};
       const auto gain = [&](int s) { return std::fabs(c) * std::ldexp(1.0, s + offset); };
-      int s = scale;
-      while (gain(s) > largest) --s;
-      if (full || gain(s) < (most > 0 ? double{least_gain} : least)) {
+      auto& scales = of->layout.products[list == &of->law ? 1 : 0];
+      const bool known = of->given_ != nullptr && products < scales.size();
+      int s = known ? scales[products] : scale;
+      while (!known && gain(s) > largest) --s;
+      if (gain(s) > largest) of->gain_too_large_ = gain(s) / largest;
+      if (known || !(gain(s) > 0)) {
+        // As it is.
+      } else if (full || gain(s) < (most > 0 ? double{least_gain} : least)) {
         while (gain(s + 1) <= largest && (full || gain(s) < largest / 4)) ++s;
       }
-      const auto rounded = static_cast<std::int32_t>(std::lround(gain(s)));
-      return high ? list->times_high(v, rounded, s, of->rounds_) : list->times(v, rounded, s);
+      if (!known) scales.push_back(s);
+      list->setting = varies ? static_cast<int>(products) : -1;
+      ++products;
+      const auto rounded = static_cast<std::int32_t>(std::lround(std::min(gain(s), largest)));
+      const Value result =
+          high ? list->times_high(v, rounded, s, of->rounds_) : list->times(v, rounded, s);
+      list->setting = -1;
+      return result;
     }
 
     /// A term at its own scale, or near `scale`; three times a number is not finer than needed.
@@ -656,7 +745,7 @@ class FixedDesign {
       const Value v = value(one.node);
       int odd = 0;
       int exponent = 0;
-      if (is_short(c, odd, exponent)) {
+      if (!one.varies && is_short(c, odd, exponent)) {
         negative = c < 0;
         Value shifted = v;
         shifted.scale -= exponent;
@@ -665,7 +754,7 @@ class FixedDesign {
         const Value near = list->to_scale(shifted, std::min(shifted.scale, scale + 2), of->rounds_);
         return list->times(near, odd, near.scale);
       }
-      return product(c, v, given == nullptr ? 0 : given->second, scale, full, negative);
+      return product(c, v, given == nullptr ? 0 : given->second, scale, full, one.varies, negative);
     }
 
     /// The sum of terms at a scale.
@@ -710,7 +799,7 @@ class FixedDesign {
         int odd = 0;
         int exponent = 0;
         if (input_of(one.node) != nullptr) continue;
-        if (!is_short(one.coefficient, odd, exponent)) continue;
+        if (!is_short(one, odd, exponent)) continue;
         const int s = value(one.node).scale - exponent;
         if (found == 1000 || (finest ? s > found : s < found)) found = s;
       }
@@ -724,7 +813,7 @@ class FixedDesign {
       for (const Term& one : terms) {
         int odd = 0;
         int exponent = 0;
-        if (input_of(one.node) != nullptr || !is_short(one.coefficient, odd, exponent)) continue;
+        if (input_of(one.node) != nullptr || !is_short(one, odd, exponent)) continue;
         if (value(one.node).scale - exponent != scale) continue;
         if (at(one.node).operation == Operation::argument) {
           return of->state_of_argument(at(one.node).a);
@@ -775,10 +864,8 @@ class FixedDesign {
     [[nodiscard]] bool is_multiplied(int node) const {
       for (const Instruction& one : call->list.instructions) {
         if (one.operation != Operation::multiply || (one.a != node && one.b != node)) continue;
-        int odd = 0;
-        int exponent = 0;
         const int other = one.a == node ? one.b : one.a;
-        if (forms.is_constant(other) && !is_short(forms.number(other), odd, exponent)) return true;
+        if (forms.is_constant(other) && !stays_short(other)) return true;
       }
       return false;
     }
@@ -793,9 +880,11 @@ class FixedDesign {
       again_ = false;
       build(keeps);
       if (again_) continue;
+      if (gain_too_large_ > 0) return refuse_settings(gain_too_large_);
       if (!finds_system()) return refuse("observer", 0, "does not decay with gains of 15 bits");
       const auto [owner, bits] = overflowing(update, false);
       if (bits == 0) return true;
+      if (given_ != nullptr) return refuse_settings(std::ldexp(1.0, bits));
       const auto root = root_of_.find(owner);
       coarser_[root != root_of_.end() && root->second >= 0 ? root->second : owner] += bits;
     }
@@ -804,10 +893,18 @@ class FixedDesign {
                   "or a smaller range");
   }
 
+  bool refuse_settings(double times) {
+    return refuse("settings_for", times,
+                  "times what the scales of that code hold comes of these gains: write that code "
+                  "from this design, and the other as its settings");
+  }
+
   void build(const std::vector<bool>& keeps) {
     const std::size_t n = states();
     update = IntegerList(n + 2);
     narrow_lines_.clear();
+    gain_too_large_ = 0;
+    if (given_ == nullptr) layout.products[0].clear();
     const RecordedCall& call = called("observe");
     const std::vector<double> given{column, column};
     of_u_ = options_.u.unit / options_.y.unit;
@@ -827,7 +924,7 @@ class FixedDesign {
     for (std::size_t i = 0; i < n; ++i) {
       update.owner = static_cast<int>(i);
       int s = static_cast<int>(std::floor(std::log2(fits / forced_[i])));
-      written.scale[i] = s - coarser_[static_cast<int>(i)];
+      written.scale[i] = given_ != nullptr ? given_->scale[i] : s - coarser_[static_cast<int>(i)];
       if (!keeps[i])
         builder.words.push_back(update.state(static_cast<int>(i), written.scale[i], 0, nullptr));
       else
@@ -871,7 +968,7 @@ class FixedDesign {
         for (const Term& t : terms) {
           std::vector<Term> inner;
           bool has_self = false;
-          if (b.at(t.node).operation != Operation::argument &&
+          if (b.at(t.node).operation != Operation::argument && !t.varies &&
               !(std::fabs(t.coefficient - 1) > 0)) {
             b.collect(t.node, 1, false, inner, -1);
             has_self = contains(b, inner, i, 3);
@@ -882,6 +979,7 @@ class FixedDesign {
             for (Term& o : open) {
               if (o.node == part.node) {
                 o.coefficient += part.coefficient;
+                o.varies = o.varies || part.varies;
                 found = true;
               }
             }
@@ -905,7 +1003,7 @@ class FixedDesign {
         for (const Term& t : others) {
           int odd = 0;
           int exponent = 0;
-          if (is_short(t.coefficient, odd, exponent)) continue;
+          if (is_short(t, odd, exponent)) continue;
           if (b.input_of(t.node) != nullptr) continue;
           product = std::min(product, b.term(t, s, true, negative).scale);
         }
@@ -1174,6 +1272,12 @@ class FixedDesign {
     for (std::size_t i = 0; i < n; ++i) range += std::fabs(exact_law_[i]) * reach[i];
     range += std::fabs(exact_law_[n]) * reference_most() + options_.u.most;
     law_scale = std::min(16, static_cast<int>(std::floor(std::log2(fits / 2 / range))));
+    if (given_ != nullptr) {
+      if (law_scale < given_->law_scale) {
+        return refuse_settings(std::ldexp(1.0, given_->law_scale - law_scale));
+      }
+      law_scale = given_->law_scale;
+    }
     for (int round = 0; round < 100; ++round) {
       if (law_scale < 2) {
         return refuse(
@@ -1182,6 +1286,7 @@ class FixedDesign {
             "them beside a quarter of a count: lower the controller's bandwidth or y.most");
       }
       law = IntegerList(n + 1);
+      if (given_ == nullptr) layout.products[1].clear();
       Builder builder{this,
                       &call,
                       linear(call, {column}),
@@ -1207,6 +1312,8 @@ class FixedDesign {
       const Value u = builder.sum(terms, law_scale, false);
       law_line = u.line;
       const auto [owner, more] = overflowing(law, true);
+      if (gain_too_large_ > 0) return refuse_settings(gain_too_large_);
+      if (given_ != nullptr && more > 0) return refuse_settings(std::ldexp(1.0, more));
       if (more == 0) {
         judge_law(u.form);
         return judges_input();
@@ -1258,6 +1365,8 @@ class FixedDesign {
   }
 
   const RecordedDesign* design_;
+  const FixedLayout* given_ = nullptr;
+  double gain_too_large_ = 0;  ///< times what its scale holds
   FixedPointOptions options_;
   bool wraps_;
   std::vector<int> state_of_;

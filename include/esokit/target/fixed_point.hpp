@@ -22,6 +22,7 @@ struct FixedCode {
   std::vector<FixedBound> estimates{};  ///< of each, in its unit
   FixedBound input{};                   ///< of u before its limits, in counts; of a controller
   WrittenSystem written{};              ///< what the bounds are from
+  FixedLayout layout{};                 ///< what other settings have to fit into
 };
 
 namespace detail {
@@ -76,17 +77,34 @@ class FixedText {
 
   [[nodiscard]] CCode code() {
     const bool controls = design_.is_controller;
-    words();
-    const auto text = [&](const char* from) { return filled(from, words_); };
     std::string lists = observe();
     if (controls) lists += law();
-    return {text(fixed_header_head) +
+    if (opens_) {  // What is the same for all settings has a mark.
+      words("");
+      mark = mark_of(lists);
+    }
+    words(design_.options.settings_name);
+    const auto text = [&](const char* from) { return filled(from, words_); };
+    const std::string set = opens_ ? text(fixed_settings) : "";
+    return {text(fixed_header_head) + (opens_ ? text(fixed_header_settings) : "") +
                 text(controls ? fixed_header_controller : fixed_header_observer) +
-                text(fixed_header_tail),
-            text(fixed_source_head) + lists + text(fixed_source_gap) +
+                (opens_ ? text(fixed_header_adopt) : "") + text(fixed_header_tail),
+            text(fixed_source_head) + set + lists + text(fixed_source_gap) +
                 text(controls ? fixed_source_controller : fixed_source_observer) +
-                text(fixed_source_self_test)};
+                (opens_ ? text(fixed_source_adopt) : "") + text(fixed_source_self_test),
+            opens_ ? "#include \"" + design_.options.name + ".h\"\n\n" + set : ""};
   }
+  /// Of the text but for settings and samples.
+  [[nodiscard]] std::uint32_t mark_of(const std::string& lists) const {
+    std::uint32_t found = 2166136261u;  // FNV-1a
+    const char* end = design_.is_controller ? fixed_source_controller : fixed_source_observer;
+    for (const char c : filled("$name $TIME $UNIT_Y $UNIT_U $UNITS$LIMITS$MEMBERS", words_) +
+                            lists + filled(fixed_source_gap, words_) + filled(end, words_)) {
+      found = (found ^ static_cast<unsigned char>(c)) * 16777619u;
+    }
+    return found;
+  }
+  std::uint32_t mark = 0;  ///< of what is the same for all settings
 
   /// Estimates of several states need equal coefficients.
   [[nodiscard]] bool can_estimate(std::size_t row) const {
@@ -132,7 +150,7 @@ class FixedText {
   /// The lines that are needed, as C. @param names of the arguments
   std::string lines(const IntegerList& list, const std::vector<int>& wanted,
                     const std::vector<std::string>& arguments, std::vector<std::string>& names,
-                    std::vector<bool>& read) const {
+                    std::vector<bool>& read) {
     std::vector<bool> need(list.lines.size(), false);
     for (const int i : wanted) {
       if (i >= 0) need[static_cast<std::size_t>(i)] = true;
@@ -169,7 +187,12 @@ class FixedText {
         from = "o->rest" + number;
       } else {
         names[i] = "t" + std::to_string(++temporaries);
-        from = IntegerList::in_c(one, names);
+        std::string setting;
+        if (one.setting >= 0) {
+          setting = "o->settings->gain[" + std::to_string(gains_.size()) + "]";
+          gains_.push_back(one.constant);
+        }
+        from = IntegerList::in_c(one, names, setting);
       }
       text += "  const int32_t " + names[i] + " = " + from + "; /* 2^-" +
               std::to_string(one.scale) + " */\n";
@@ -177,7 +200,7 @@ class FixedText {
     return text;
   }
 
-  std::string observe() const {
+  std::string observe() {
     std::vector<int> wanted = d_.next;
     wanted.insert(wanted.end(), d_.next_rest.begin(), d_.next_rest.end());
     std::vector<std::string> names;
@@ -200,7 +223,7 @@ class FixedText {
     return text + "}\n\n";
   }
 
-  std::string law() const {
+  std::string law() {
     std::vector<std::string> names;
     std::vector<bool> read;
     const std::string inside = lines(d_.law, {d_.law_line}, {"r"}, names, read);
@@ -234,7 +257,7 @@ class FixedText {
     }
   }
 
-  void words() {
+  void words(const std::string& settings_name) {
     const std::size_t n = d_.states();
     const FixedPointOptions& options = d_.options();
     const bool wraps = d_.wraps();
@@ -285,6 +308,7 @@ class FixedText {
     }
     if (wraps) members += "  uint16_t y_last; /* the counter */\n";
 
+    if (opens_) members += "  const " + name + "_settings *settings;\n";
     std::string reach;
     std::string box;
     for (std::size_t i = 0; i < n; ++i) {
@@ -334,8 +358,9 @@ class FixedText {
       rest_at += "  o->x[" + number + "] = " +
                  (sum.empty() ? std::string("0")
                               : "within(" + sum + ", " +
-                                    text_of(static_cast<std::int64_t>(
-                                        std::ldexp(d_.box[i], d_.written.scale[i]))) +
+                                    (opens_ ? "o->settings->box[" + number + "]"
+                                            : text_of(static_cast<std::int64_t>(
+                                                  std::ldexp(d_.box[i], d_.written.scale[i])))) +
                                     ", &status)") +
                  ";\n";
     }
@@ -389,9 +414,20 @@ class FixedText {
       return text_of(static_cast<std::int64_t>(std::nearbyint(physical / options.u.unit)) * one);
     };
     std::string rate;
+    const std::string lower = text_of(static_cast<std::int64_t>(d_.lower) * one);
+    const std::string highest = text_of(static_cast<std::int64_t>(d_.upper) * one);
+    std::string limits;
+    std::string limit_values;
+    if (design_.is_controller) {
+      limits = "  int32_t lower; /* of u, in 2^-$LAW_SCALE counts */\n  int32_t upper;\n";
+      limit_values = "  " + lower + ",\n  " + highest + ",\n";
+    }
     if (d_.rate > 0) {
-      const std::string step =
+      std::string step =
           text_of(static_cast<std::int64_t>(std::floor(std::ldexp(d_.rate, d_.law_scale))));
+      limits += "  int32_t rate; /* a sample */\n";
+      limit_values += "  " + step + ",\n";
+      if (opens_) step = "o->settings->rate";
       rate = "  if (u > (o->u_last + " + step + ")) {\n    u = o->u_last + " + step + ";\n  }\n" +
              "  if (u < (o->u_last - " + step + ")) {\n    u = o->u_last - " + step + ";\n  }\n";
     }
@@ -399,9 +435,34 @@ class FixedText {
                                       : "  if (r > " + y_most + ") {\n    r = " + y_most +
                                             ";\n  }\n  if (r < -" + y_most + ") {\n    r = -" +
                                             y_most + ";\n  }\n";
+    std::string gain;
+    for (const std::int32_t one_gain : gains_) {
+      gain += (gain.empty() ? "" : ", ") + std::to_string(one_gain);
+    }
+    const auto table = [](const std::string& what) {
+      return "  static const int32_t most[$N] = {" + what + "};\n";
+    };
     const std::string type = wraps ? "uint16_t" : "int32_t";
     const auto& comment = design_.options.comment;
     words_ = {{"$include", "#include"},
+              {"$REACH_TABLE", opens_ ? "" : table("$REACH")},
+              {"$CORRECT_TABLES",
+               opens_ ? ""
+                      : "  static const int32_t m[$ROWS][$N][$N1] = { /* after 1, 2, .. samples "
+                        "*/\n$CORRECT_M  };\n  static const uint8_t powers[$ROWS][$N][$N1] = "
+                        "{\n$CORRECT_P  };\n" +
+                            table("$BOX")},
+              {"$GAINS_OF", opens_ ? "o->settings->correct[elapsed - 1u], "
+                                     "o->settings->powers[elapsed - 1u]"
+                                   : "m[elapsed - 1u], powers[elapsed - 1u]"},
+              {"$REACH_OF", opens_ ? "o->settings->reach" : "most"},
+              {"$BOX_OF", opens_ ? "o->settings->box" : "most"},
+              {"$LOWER_OF", opens_ ? "o->settings->lower" : lower},
+              {"$UPPER_OF", opens_ ? "o->settings->upper" : highest},
+              {"$LIMITS", limits},
+              {"$LIMIT_VALUES", limit_values},
+              {"$GAINS", std::to_string(gains_.size())},
+              {"$GAIN", gain},
               {"$MEMBERS", members},
               {"$TIME", text_of(design_.sample_time)},
               {"$UNIT_Y", text_of(options.y.unit)},
@@ -440,10 +501,9 @@ class FixedText {
               {"$Y_ABSOLUTE", wraps ? "0" : "y"},
               {"$NEW_Y", wraps ? "    o->y_last = given;\n" : ""},
               {"$ESTIMATES", estimates},
-              {"$INIT", wraps ? "  o->y_last = 0u;\n" : ""},
+              {"$INIT", std::string(opens_ ? "  o->settings = &$name_$SET;\n" : "") +
+                            (wraps ? "  o->y_last = 0u;\n" : "")},
               {"$RATE_LIMIT", rate},
-              {"$LOWER", text_of(static_cast<std::int64_t>(d_.lower) * one)},
-              {"$UPPER", text_of(static_cast<std::int64_t>(d_.upper) * one)},
               {"$HALF", text_of(one / 2)},
               {"$ONE", text_of(one)},
               {"$CLAMP_R", clamp_r},
@@ -467,12 +527,16 @@ class FixedText {
               {"$N1", std::to_string(n + 1)},
               {"$NAME", upper},
               {"$N", std::to_string(n)},
+              {"$SET", settings_name},
+              {"$MARK", std::to_string(mark)},
               {"$name", name},
               {"$COMMENT", comment.empty() ? "" : " * " + comment + "\n"}};
   }
 
   const FixedDesign& d_;
   const RecordedDesign& design_;
+  bool opens_ = !design_.settings.empty();
+  std::vector<std::int32_t> gains_;  ///< that may be changed while it runs
   Words words_;
 };
 
@@ -496,6 +560,14 @@ class FixedText {
 /// CascadeEso; AlgebraicEso once it has settled and the frozen ExtendedStateFilter, which restart
 /// after any gap with the gains of then) and Adrc around them up to order 2. A limit of rate may be
 /// below one count a sample.
+///
+/// With CodeOptions::settings_in_struct, gains and limits are in a struct, and `name_adopt` takes
+/// another one while it runs: CCode::settings of another design that was written with
+/// FixedPointOptions::settings_for. The scales are those of the running code; gains that do not fit
+/// into them, ranges that would overflow and bounds above what is allowed are refused here. A
+/// switch holds each state within the range of the new settings, so no sequence of switches
+/// overflows; the bounds hold again as what the old settings left decays. Write the running code
+/// from the design with the largest gains.
 /// @param object as `make` returned it; the C begins at rest at zero
 /// @return error, with what would do, for ranges that 32 bits cannot hold, a bound above what is
 ///         allowed, and designs that are not linear or have what is not written in fixed point
@@ -505,7 +577,8 @@ Expected<FixedCode, Error<typename Object::scalar_type>> to_fixed_c(
   using V = typename Object::scalar_type;
   const auto recorded = detail::recorded_design(object, options.code);
   if (!recorded) return recorded.error();
-  detail::FixedDesign design(*recorded, options);
+  const bool given = options.settings_for != nullptr;
+  detail::FixedDesign design(*recorded, options, given ? &options.settings_for->layout : nullptr);
   if (!design.make()) {
     const detail::FixedRefusal& no = design.refusal;
     return Error<V>{no.field, static_cast<V>(no.value), no.rule,
@@ -521,7 +594,14 @@ Expected<FixedCode, Error<typename Object::scalar_type>> to_fixed_c(
       design.estimates[row].deviation += std::fabs(std::ldexp(c, -scale)) * text.states_of(row);
     }
   }
-  return FixedCode{text.code(), design.estimates, design.input, design.written};
+  FixedCode made{text.code(), design.estimates, design.input, design.written, design.layout};
+  made.layout.mark = text.mark;
+  if (given && text.mark != options.settings_for->layout.mark) {
+    return Error<V>{"settings_for", static_cast<V>(text.mark),
+                    "must be the code of a design with the same name, structure, sample time, b0, "
+                    "ranges, max_gap and signs of its gains"};
+  }
+  return made;
 }
 
 }  // namespace esokit

@@ -34,6 +34,59 @@ extern "C" {
 $UNITS
 )";
 
+/// Settings that can be changed while it runs.
+inline constexpr const char* fixed_header_settings =
+    R"(#define $NAME_SETTINGS_REJECTED 64u /* adopt: they are of another text */
+
+/* What may be changed while it runs, by $name_adopt. (MISRA C:2012 8.7, advisory: those of other
+ * designs are in other files.) */
+typedef struct {
+  uint32_t design; /* of which text: others are refused */
+  int32_t gain[$GAINS];
+  int32_t reach[$N]; /* where the states can be, and where a measurement leaves them */
+  int32_t box[$N];
+$LIMITS  int32_t correct[$ROWS][$N][$N1]; /* after 1, 2, .. samples */
+  uint8_t powers[$ROWS][$N][$N1];
+} $name_settings;
+
+extern const $name_settings $name_$SET;
+
+)";
+inline constexpr const char* fixed_header_adopt =
+    R"(/* Other settings, written for this text, from now on; estimates and output are kept, but a state
+ * outside the range of the new settings is held there. Returns a status. */
+unsigned $name_adopt($name_state *o, const $name_settings *settings);
+)";
+inline constexpr const char* fixed_settings = R"(const $name_settings $name_$SET = {
+  $MARKu,
+  {$GAIN},
+  {$REACH},
+  {$BOX},
+$LIMIT_VALUES  {
+$CORRECT_M  },
+  {
+$CORRECT_P  }
+};
+
+)";
+inline constexpr const char* fixed_source_adopt =
+    R"(unsigned $name_adopt($name_state *o, const $name_settings *settings)
+{
+  unsigned status = $NAME_SETTINGS_REJECTED;
+  unsigned i;
+  if (settings->design == $MARKu) {
+    const int32_t *most = (o->gap > 0u) ? settings->reach : settings->box;
+    status = 0u;
+    o->settings = settings;
+    for (i = 0u; i < $Nu; ++i) {
+      o->x[i] = within(o->x[i], most[i], &status);
+    }
+  }
+  return status;
+}
+
+)";
+
 /// The header of a controller.
 inline constexpr const char* fixed_header_controller = R"(/* `mode`: what determines u. */
 #define $NAME_RUNNING 0u
@@ -166,8 +219,7 @@ static unsigned predict_slowly($name_state *o, int32_t given)
 $PREDICT_M  };
   static const uint8_t powers[$N][$N1] = {
 $PREDICT_P  };
-  static const int32_t most[$N] = {$REACH};
-  unsigned status = 0u;
+$REACH_TABLE  unsigned status = 0u;
   int32_t u = given;
   if (u > $U_MOST) {
     u = $U_MOST;
@@ -181,17 +233,12 @@ $PREDICT_P  };
   if (o->gap < 65535u) {
     o->gap = (uint16_t)(o->gap + 1u);
   }
-  return status | moved(o, m, powers, u, most);
+  return status | moved(o, m, powers, u, $REACH_OF);
 }
 
 static unsigned correct_slowly($name_state *o, $Y_TYPE given, int32_t u)
 {
-  static const int32_t m[$ROWS][$N][$N1] = { /* after 1, 2, .. samples */
-$CORRECT_M  };
-  static const uint8_t powers[$ROWS][$N][$N1] = {
-$CORRECT_P  };
-  static const int32_t most[$N] = {$BOX};
-  unsigned status = $NAME_MEASUREMENT_REJECTED;
+$CORRECT_TABLES  unsigned status = $NAME_MEASUREMENT_REJECTED;
   unsigned elapsed = o->gap;
 $OF_Y_SLOWLY  if (elapsed < 1u) {
     elapsed = 1u;
@@ -201,7 +248,7 @@ $OF_Y_SLOWLY  if (elapsed < 1u) {
       status = rest_at(o, $Y_ABSOLUTE, u) | $NAME_RESTARTED;
 $NEW_Y    }
   } else if ($Y_IN_GAP_RANGE) {
-    status = moved(o, m[elapsed - 1u], powers[elapsed - 1u], y, most);
+    status = moved(o, $GAINS_OF, y, $BOX_OF);
 $NEW_Y    if (elapsed > 1u) {
       status |= $NAME_GAP_BRIDGED;
     }
@@ -268,11 +315,11 @@ inline constexpr const char* fixed_source_controller =
 static int32_t limited($name_state *o, int32_t wanted)
 {
   int32_t u = wanted;
-$RATE_LIMIT  if (u < $LOWER) {
-    u = $LOWER;
+$RATE_LIMIT  if (u < $LOWER_OF) {
+    u = $LOWER_OF;
   }
-  if (u > $UPPER) {
-    u = $UPPER;
+  if (u > $UPPER_OF) {
+    u = $UPPER_OF;
   }
   o->u_last = u;
   u = (u + $HALF) >> $LAW_SCALE;

@@ -38,7 +38,8 @@ struct IntegerLine {
   std::int32_t constant = 0;
   int scale = 0;
   LinearForm form{};
-  int owner = -1;  ///< whose scale has to be coarser if it does not fit
+  int owner = -1;    ///< whose scale has to be coarser if it does not fit
+  int setting = -1;  ///< the constant may be changed while it runs: which of those it is
 };
 
 /// A line seen with another scale: an integer times a power of two costs nothing.
@@ -61,7 +62,8 @@ class IntegerList {
 
   std::vector<IntegerLine> lines{};
   std::vector<Rounding> roundings{};
-  int owner = -1;  ///< of the lines that follow
+  int owner = -1;    ///< of the lines that follow
+  int setting = -1;  ///< of the lines that follow
 
   [[nodiscard]] std::size_t columns() const { return columns_; }
 
@@ -76,11 +78,11 @@ class IntegerList {
     for (std::size_t i = 0; i < lines.size(); ++i) {  // once is enough
       const IntegerLine& one = lines[i];
       if (one.operation == operation && one.a == a && one.b == b && one.constant == constant &&
-          one.scale == scale) {
+          one.scale == scale && one.setting == setting) {
         return {static_cast<int>(i), scale, one.form};
       }
     }
-    lines.push_back({operation, a, b, constant, scale, form, owner});
+    lines.push_back({operation, a, b, constant, scale, form, owner, setting});
     return {static_cast<int>(lines.size()) - 1, scale, form};
   }
 
@@ -204,13 +206,14 @@ class IntegerList {
     return fits;
   }
 
-  /// A line as an expression of C.
+  /// A line as an expression of C. @param setting what holds its constant, if it is one
   [[nodiscard]] static std::string in_c(const IntegerLine& one,
-                                        const std::vector<std::string>& names) {
+                                        const std::vector<std::string>& names,
+                                        const std::string& setting = "") {
     const std::string a = one.a >= 0 && static_cast<std::size_t>(one.a) < names.size()
                               ? names[static_cast<std::size_t>(one.a)]
                               : "";
-    const std::string c = std::to_string(one.constant);
+    const std::string c = setting.empty() ? std::to_string(one.constant) : setting;
     switch (one.operation) {
       case IntegerOperation::add:
         return a + " + " + names[static_cast<std::size_t>(one.b)];
@@ -220,7 +223,8 @@ class IntegerList {
         return a + " * " + c;
       case IntegerOperation::times_high:
       case IntegerOperation::times_high_rounded: {
-        const std::string low = "((uint32_t)(uint16_t)" + a + " * " + c + "u)";
+        const std::string low = "((uint32_t)(uint16_t)" + a + " * " +
+                                (setting.empty() ? c + "u" : "(uint32_t)" + c) + ")";
         return "((int32_t)(int16_t)(" + a + " >> 16) * " + c + ") +\n      (int32_t)(" +
                (one.operation == IntegerOperation::times_high ? low : "(" + low + " + 32768u)") +
                " >> 16)";
