@@ -564,9 +564,15 @@ TEST(FixedPoint, AnySequenceOfSettingsIsDefined) {
   for (int k = 0; k < 300000; ++k) {
     if (random.index(20) == 0) y = -y;
     if (random.index(20) == 0) u = -u;
-    if (random.index(100) == 0) (void)c.predict(c.state.data(), u);
+    const bool missing = random.index(100) == 0;
+    if (missing) (void)c.predict(c.state.data(), u);
     if (random.index(30) == 0) {
-      const unsigned status = c.adopt(c.state.data(), random.index(2) == 0 ? c.other : c.design);
+      const bool slow = random.index(2) == 0;
+      const unsigned status = c.adopt(c.state.data(), slow ? c.other : c.design);
+      const WrittenSystem& w = slow ? other.written : base.written;
+      for (std::size_t i = 0; i < 3 && !missing; ++i) {
+        ASSERT_LE(std::fabs(std::ldexp(c.state[i], -w.scale[i])), w.most[i]) << k << ", " << i;
+      }
       EXPECT_EQ(status & ~128u, 0u);
       held += status == 128;
       ++switches;
