@@ -182,9 +182,9 @@ class FixedPlay {
       const Y counter = counter_;
       const std::vector<double> exact = exact_;
       double best = 0;
-      std::array<std::int32_t, 2 * block> chosen{};
+      std::array<std::int32_t, std::size_t{2} * block> chosen{};
       for (int i = 0; i < candidates; ++i) {
-        std::array<std::int32_t, 2 * block> tried{};
+        std::array<std::int32_t, std::size_t{2} * block> tried{};
         for (int j = 0; j < block; ++j) {
           const auto at = static_cast<std::size_t>(2 * j);
           tried[at] = in_range(next_bits(), options_.y.most);
