@@ -453,7 +453,7 @@ for core in cortex-m4f cortex-m7; do
   limit "$core: bytes of the C of Adrc<LinearEso<2>>" "$(written_bytes "$core" loop)" 1433
   limit "$core: instructions of the C of LinearEso<2>" \
     "$(value "$out/$core-written_c.txt" count eso 3)" 50
-  limit "$core: bytes of the whole image" "$(text_bytes "$core" firmware)" 67584
+  limit "$core: bytes of the whole image" "$(text_bytes "$core" firmware)" 69632
 done
 
 # The C in integers: LinearEso, with 16 bits, Adrc, LinearEso with settings in a struct.
