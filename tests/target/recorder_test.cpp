@@ -17,7 +17,6 @@
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/control/nonlinear_feedback.hpp>
-#include <esokit/control/predictive_adrc.hpp>
 #include <esokit/control/tracking_differentiator.hpp>
 #include <esokit/gain/pole_set.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
@@ -448,7 +447,6 @@ TEST(NotRecorded, WhatRunsLaneByLane) {
                {can_be_recorded<KnownModel<Plain, Friction<0, double>>>, "of plain scalars"},
                {can_be_recorded<Adrc<DelayedInput<Plain, 4>>>, "its observer"},
                {can_be_recorded<DisturbanceCompensator<OutlierGate<Plain>>>, "its observer"},
-               {can_be_recorded<PredictiveAdrc<Plain>>, "two phases, lane by lane"},
                {can_be_recorded<MimoAdrc<Plain, Plain>>, "several channels, lane by lane"},
                {can_be_recorded<MimoExtendedStateFilter<ChainOrders<1>, 2>>, "lane by lane"},
                {can_be_recorded<TrackingDifferentiator<>>, "branches, lane by lane"}};
