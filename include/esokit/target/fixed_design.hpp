@@ -68,15 +68,15 @@ struct WrittenSystem {
 
 /// What settings that are changed while it runs leave as it is.
 struct FixedLayout {
-  std::vector<int> scale{};      ///< of the states
-  std::vector<bool> keeps{};     ///< which of them keep what is left over
-  bool rounds = false;           ///< shifts round
-  std::map<int, int> coarser{};  ///< scales of what is computed, by its owner
-  std::map<int, int> narrow{};
-  std::map<int, int> left_over{};
+  std::vector<int> scale{};                    ///< of the states
+  std::vector<bool> keeps{};                   ///< which of them keep what is left over
+  bool rounds = false;                         ///< shifts round
+  std::map<int, int> coarser{};                ///< scales of what is computed, by its owner
+  std::map<int, int> narrow{};                 ///< scales of what has 16 bits, by its owner
+  std::map<int, int> left_over{};              ///< scales of what is left over, by its owner
   std::array<std::vector<int>, 2> products{};  ///< scales of the products, of update and law
-  int law_scale = 0;
-  std::uint32_t mark = 0;  ///< of the text
+  int law_scale = 0;                           ///< u is kept in 2^-law_scale counts
+  std::uint32_t mark = 0;                      ///< of the text
 };
 
 namespace detail {
