@@ -5,6 +5,7 @@
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
+#include <esokit/gain/pole_set.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
@@ -62,6 +63,20 @@ TEST(CGuarded, OfPinHoldAndGain) {
                                                                    settings.measurement_divider = 2;
                                                                  });
   equals<Guarded<LinearEso<3, double>>>(30000, 921);  // it softens: no changing b0
+}
+
+/// A fast pair beside slow poles is proven only with corrections frozen for 70 samples after a
+/// hold.
+TEST(CGuarded, FrozenAfterAHold) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  using Settling = Guarded<LinearEso<2, double, 1, PoleSet>>;
+  const auto pair = [](auto& settings) {
+    auto& observer = settings.observer.observer;
+    observer.poles[0] = -20;
+    observer.poles[1] = {-3, 20};
+    observer.poles[2] = {-3, -20};
+  };
+  equals_changed<Adrc<Settling>>(30000, 931, "gcc -std=c99", pair);
 }
 
 /// As of others, see c_code_test.cpp.
