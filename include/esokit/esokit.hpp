@@ -193,6 +193,7 @@
 #include <esokit/target/profile_code.hpp>
 #include <esokit/target/recorded_design.hpp>
 #include <esokit/target/recorder.hpp>
+#include <esokit/target/st_translator.hpp>
 #include <esokit/target/structured_text.hpp>
 #include <esokit/tune/controller.hpp>
 #include <esokit/tune/controller_source.hpp>
