@@ -2,9 +2,9 @@
 """Interprets the Structured Text that to_structured_text writes (IEC 61131-3, only the subset of
 it that is written, with strict types) and compares it with samples of the C++ object, bit for bit.
 
-usage: structured_text.py BLOCK.st SAMPLES [VARIABLES]
+usage: structured_text.py BLOCK.st SAMPLES
 SAMPLES: a line of input names, `:`, output names; then a line per call, numbers as hex floats, of
-a struct the name of one of VARIABLES (declarations as in a VAR block).
+a struct the name of a function that fills it.
 Prints the number of calls that were compared; the status is 1 at the first difference."""
 import math
 import re
@@ -208,15 +208,6 @@ class Text:
                     self.expect(",")
             self.expect("]")
             return all_of_it
-        if isinstance(kind, dict):
-            new = self.filled(kind)
-            self.expect("(")
-            while not self.take(")"):
-                field = self.name()
-                self.expect(":=")
-                setattr(new, field, self.initial(kind[field][0]))
-                self.take(",")
-            return new
         code, its = self.expression()
         return eval(self.given(code, its, kind), self.scope)  # a literal
 
@@ -545,12 +536,6 @@ def bits(value):
 def main():
     with open(sys.argv[1], encoding="utf-8") as file:
         text = Text(file.read())
-    variables = {}
-    if len(sys.argv) > 3:
-        with open(sys.argv[3], encoding="utf-8") as file:
-            text.tokens, text.at = tokens(file.read()), 0
-        while text.peek():
-            text.declaration(variables)
     with open(sys.argv[2], encoding="utf-8") as file:
         inputs, outputs = (part.split() for part in file.readline().split(":"))
         calls = 0
@@ -559,7 +544,8 @@ def main():
             for name, number in zip(inputs, numbers):
                 kind = text.kinds[name]
                 if isinstance(kind, dict):
-                    value = clone(variables[number][1])
+                    value = getattr(text.values, name)
+                    text.scope["call_" + number](settings=value)
                 elif kind in FLOATS:
                     value = float.fromhex(number)
                 else:

@@ -64,16 +64,14 @@ std::string estimate_names(int size) {
   return names;
 }
 
-/// Runs both in the interpreter. @param variables that samples name
-void interprets(const std::string& block, const Samples& samples,
-                const std::string& variables = "") {
+/// Runs both in the interpreter.
+void interprets(const std::string& block, const Samples& samples) {
   const Folder folder;
   folder.write("block.st", block);
   folder.write("samples", samples.text());
-  folder.write("variables", variables);
   const std::string script = ESOKIT_STRUCTURED_TEXT_INTERPRETER;
   EXPECT_TRUE(runs("python3 '" + script + "' " + folder.file("block.st") + " " +
-                   folder.file("samples") + " " + folder.file("variables") + " >/dev/null"));
+                   folder.file("samples") + " >/dev/null"));
 }
 
 constexpr int samples_each = 1500;
@@ -404,11 +402,11 @@ void adopts_in_text(std::uint64_t seed) {
     }
     const V r = V((k / 200) % 2);
     const V u = controller.update(y, r);
-    constexpr const char* names[] = {"design", "slow", "other"};
+    constexpr const char* names[] = {"loop_set_design", "loop_set_slow", "loop_set_other"};
     samples.number(y).count(0).number(r).word(names[set]).count(adopts);
     samples.number(u).count(adopted).estimates(controller.observer());
   }
-  interprets(block, samples, sets);
+  interprets(block + sets, samples);
 }
 
 TEST(StructuredText, AdoptsSettings) {

@@ -74,14 +74,27 @@ class StTranslator {
     return arrays + all + text_;
   }
 
-  /// A variable with the settings that the type begins with. @param as its name
+  /// A function that gives the settings that the type begins with. @param as behind its name
   [[nodiscard]] std::string settings(const std::string& as) const {
-    std::string all;
+    const std::string name = name_ + "_set_" + as;
+    std::string text =
+        "FUNCTION " + name + " : BOOL\nVAR_IN_OUT\n  settings : " + name_ + "_settings;\nEND_VAR\n";
     for (const Variable& field : structs_.at(name_ + "_settings")) {
-      all += (all.empty() ? "" : ",\n  ") + field.name +
-             " := " + (field.sizes.empty() ? field.initial : "[" + field.initial + "]");
+      std::size_t at = 0;
+      std::size_t place = 0;
+      do {
+        const std::size_t end = field.initial.find(',', at);
+        text += "  settings." + field.name;
+        if (!field.sizes.empty()) {
+          const auto row = static_cast<std::size_t>(field.sizes.back());
+          text += "[" + std::to_string(place / row) + ", " + std::to_string(place % row) + "]";
+        }
+        text += " := " + field.initial.substr(at, end - at) + ";\n";
+        at = end + 2;
+        ++place;
+      } while (at != std::string::npos + 2);
     }
-    return as + " : " + name_ + "_settings := (\n  " + all + ");\n";
+    return text + "  " + name + " := TRUE;\nEND_FUNCTION\n\n";
   }
 
   /// One of C.
@@ -384,8 +397,8 @@ class StTranslator {
     while (error.empty() && !take(")")) {
       if (take("void")) continue;
       Variable one = declarator();
-      one.by_reference = (one.by_reference || !one.sizes.empty()) &&
-                         (!one.is_constant || one.type == name_ + "_state");
+      const bool whole = one.by_reference && one.is_constant && one.type != name_ + "_state";
+      one.by_reference = (one.by_reference && !whole) || !one.sizes.empty();
       function.changes = function.changes || (one.by_reference && !one.is_constant);
       function.parameters.push_back(one);
       (void)take(",");
@@ -952,13 +965,12 @@ class StTranslator {
     }
     if (std::isdigit(static_cast<unsigned char>(word[0])) != 0) {
       const std::string text = number(word);
-      if (text == "1.7976931348623157E+308") {  // which not each compiler takes
-        return {helper("largest", "LREAL", "", "",
-                       filled("  (* of 1: 2^8 (1 - 2^-53) (2^127)^8 *)\n  $f := x * "
-                              "255.99999999999997 * $A * $A * $A * $A * $A * $A * $A * $A;\n",
-                              {{"$A", "1.7014118346046923E+38"}})) +
-                    "(1.0)",
-                "LREAL", false, false, true};
+      // Not each compiler takes an LREAL beyond what a REAL holds.
+      if (text == "1.7976931348623157E+308") {
+        return far("largest", "255.99999999999997", "1.7014118346046923E+38");
+      }
+      if (text == "2.2250738585072014E-308") {
+        return far("smallest", "0.00006103515625", "1.1754943508222875E-38");
       }
       return {text, text.find('.') == std::string::npos ? "UDINT" : real_, false, false, true};
     }
@@ -1059,6 +1071,14 @@ class StTranslator {
              (own.empty() ? "" : "VAR\n  " + own + " : " + real_ + ";\nEND_VAR\n") +
              filled(body, {{"$f", name}}) + "END_FUNCTION\n\n";
     return name;
+  }
+  /// The factor times the eighth power of the other one, exactly.
+  Value far(const std::string& stem, const std::string& factor, const std::string& power) {
+    return {helper(stem, "LREAL", "", "",
+                   filled("  $f := x * $F * $A * $A * $A * $A * $A * $A * $A * $A; (* x is 1 *)\n",
+                          {{"$F", factor}, {"$A", power}})) +
+                "(1.0)",
+            "LREAL", false, false, true};
   }
   /// To the nearest whole number, a half away from zero, or up: not a function of each PLC.
   std::string rounding(const std::string& stem) {

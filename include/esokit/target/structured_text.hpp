@@ -87,7 +87,7 @@ END_IF;
 /// The function block of a design, and an error of the translation.
 struct StructuredText {
   std::string text{};
-  std::string settings{};  ///< a variable, with settings_in_struct
+  std::string settings{};  ///< a function, with settings_in_struct
   std::string error{};
 };
 
@@ -256,7 +256,8 @@ Expected<std::string, Error<typename Object::scalar_type>> to_structured_text(
 }
 
 /// With CodeOptions::settings_in_struct: the settings of another design of the same structure, as a
-/// variable `settings_name` to be declared beside the block and given to its input `settings`.
+/// function `name_set_settings_name` that gives them to a variable of type `name_settings`, for the
+/// input `settings` of the block. @return its text, or an error as for to_structured_text
 template <detail::Writable Object>
 Expected<std::string, Error<typename Object::scalar_type>> to_structured_settings(
     const Object& object, const CodeOptions& options) {
