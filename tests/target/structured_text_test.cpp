@@ -17,6 +17,7 @@
 #include <esokit/observer/half_gain_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/model_eso.hpp>
+#include <esokit/target/profile_code.hpp>
 #include <esokit/target/structured_text.hpp>
 #include <target/written.hpp>
 
@@ -364,6 +365,44 @@ TEST(StructuredText, OfPredictiveAdrc) {
   predicts_in_text<PredictiveAdrc<HalfGainEso<2, float>>>(511);
 }
 
+template <int Order, class V>
+void moves_in_text(std::uint64_t seed) {
+  SCOPED_TRACE(Order);
+  using Profile = SmoothProfile<Order, V>;
+  typename Profile::Config settings{};
+  settings.sample_time = V(0.01);
+  for (int i = 0; i < Order; ++i) settings.limits[static_cast<std::size_t>(i)] = V(2 + 3 * i);
+  Profile profile = Profile::make(settings).value();
+  const auto block = to_structured_text(profile, {.name = "profile"}).value();
+  std::string names;
+  for (int i = 1; i <= Order; ++i) names += " r" + std::to_string(i);
+  Samples samples("target resets : good moves r" + names);
+  Random random(seed);
+  V target(1);
+  int moving = 0;
+  for (int k = 0; k < 4 * samples_each; ++k) {
+    if (random.index(60) == 0) target = static_cast<V>(random.uniform(-1, 1));
+    const V given = odd(random, target);
+    const bool resets = random.index(200) == 0;
+    const bool good =
+        resets ? static_cast<bool>(profile.reset(given)) : static_cast<bool>(profile.update(given));
+    const auto motion = profile.motion();
+    samples.number(given).count(resets).count(good).count(profile.moving());
+    for (int i = 0; i <= Order; ++i) samples.number(motion(i));
+    samples.word("\n");
+    moving += profile.moving();
+  }
+  EXPECT_GT(moving, samples_each);
+  interprets(block, samples);
+}
+
+TEST(StructuredText, OfProfiles) {
+  if (!there("python3")) GTEST_SKIP() << "no python3";
+  moves_in_text<1, float>(701);
+  moves_in_text<2, double>(711);
+  moves_in_text<3, double>(721);
+}
+
 /// Settings that change while it runs, as by `adopt`.
 template <class C>
 void adopts_in_text(std::uint64_t seed) {
@@ -419,6 +458,17 @@ TEST(StructuredText, AdoptsSettings) {
 
 #endif  // ESOKIT_LOADS_C
 
+TEST(StructuredText, RefusesNamesOfTheLanguage) {
+  const auto observer =
+      LinearEso<1, double>::make(observer_config<LinearEso<1, double>>(8)).value();
+  for (const char* name : {"Limit", "MOVE", "a__b", "axis_"}) {
+    const auto text = to_structured_text(observer, {.name = name});
+    ASSERT_FALSE(text) << name;
+    EXPECT_STREQ(text.error().field, "name");
+  }
+  EXPECT_TRUE(to_structured_text(observer, {.name = "axis_1"}));
+}
+
 /// What is not of the subset of C that is written is not translated.
 TEST(StructuredText, RefusesOtherC) {
   const auto refusal = [](const std::string& body) {
@@ -428,7 +478,7 @@ TEST(StructuredText, RefusesOtherC) {
         "= 1.0;\n  return true;\n}\nstatic double g(a_state *o, double y)\n{\n" +
             body + "}\n",
         "a");
-    (void)translator.root("g");
+    translator.write_for("a_g(");
     return translator.error;
   };
   EXPECT_EQ(refusal("  return o->z + y;\n"), "");

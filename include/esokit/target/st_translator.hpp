@@ -30,12 +30,11 @@ class StTranslator {
   /// What it could not translate; empty: nothing.
   std::string error{};
 
-  /// The function and all that it calls are written. @return its name, empty if there is none
-  std::string root(const std::string& name) {
-    const auto found = functions_.find(name);
-    if (found == functions_.end()) return {};
-    written(name);
-    return found->second.name;
+  /// Whatever `body` calls is written, with all that these call.
+  void write_for(const std::string& body) {
+    for (auto& [word, function] : functions_) {
+      if (body.find(function.name + "(") != std::string::npos) written(word);
+    }
   }
   [[nodiscard]] bool has(const std::string& name) const { return functions_.count(name) != 0; }
 
@@ -97,6 +96,21 @@ class StTranslator {
     return text + "  " + name + " := TRUE;\nEND_FUNCTION\n\n";
   }
 
+  /// Words of Structured Text may not be names. @param word in any case
+  [[nodiscard]] static bool is_taken(std::string word) {
+    static const std::string taken =
+        " and any array at by byte case concat const constant cos date delete dint div do dt dword "
+        "else elsif end eq exit exp expt false find for from function ge gt if insert int le left "
+        "len limit lint ln log lreal lt lword max mid min mod move mul mux ne not of on or program "
+        "read real repeat replace retain return right rol ror sel shl shr sin sint sqrt step "
+        "string struct sub tan task then time to tod true trunc type udint uint until usint var "
+        "while with word wstring xor abs add ";
+    for (char& c : word) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    return taken.find(" " + word + " ") != std::string::npos;
+  }
+  [[nodiscard]] static std::string name_of(const std::string& word) {
+    return is_taken(word) ? "the_" + word : word;
+  }
   /// One of C.
   static std::string number(std::string text) {
     if (text.compare(0, 2, "0x") == 0) {
@@ -273,13 +287,6 @@ class StTranslator {
   }
   [[nodiscard]] std::string of_this(const std::string& word) const {
     return word.compare(0, name_.size() + 1, name_ + "_") == 0 ? word : name_ + "_" + word;
-  }
-  /// Words of Structured Text may not be names.
-  [[nodiscard]] static std::string name_of(const std::string& word) {
-    static const std::set<std::string> taken{"at",   "by",    "limit", "left", "step",
-                                             "to",   "on",    "of",    "max",  "min",
-                                             "time", "right", "len",   "move", "insert"};
-    return taken.count(word) != 0 ? "the_" + word : word;
   }
   [[nodiscard]] std::string array_name(int size) const {
     return name_ + "_numbers_" + std::to_string(size);
@@ -566,7 +573,10 @@ class StTranslator {
       line("RETURN;");
     } else if (word == "(" && peek(1) == "void") {
       at_ += 3;
-      const Value value = expression();
+      if (peek() == "memset") {  // before the first values: those of the type are zero
+        while (error.empty() && peek() != ";") ++at_;
+      }
+      const Value value = peek() == ";" ? Value{} : expression();
       expect(";");
       if (value.text.find('(') != std::string::npos) ignore(value);
     } else if (word == "static" || word == "const" || is_type(word)) {
@@ -622,7 +632,10 @@ class StTranslator {
       expect("=");
       one.initial = initializer();
       expect(";");
-      if (structs_.count(name_ + "_state") != 0) {
+      const bool has_state =
+          std::any_of(locals_.begin(), locals_.end(),
+                      [this](const Variable& other) { return other.type == name_ + "_state"; });
+      if (has_state) {
         add_table(one);
       } else {
         add_local(one);
@@ -972,7 +985,12 @@ class StTranslator {
       if (text == "2.2250738585072014E-308") {
         return far("smallest", "0.00006103515625", "1.1754943508222875E-38");
       }
-      return {text, text.find('.') == std::string::npos ? "UDINT" : real_, false, false, true};
+      const bool single = word.back() == 'f' && word[1] != 'x';
+      return {text,
+              text.find('.') == std::string::npos ? "UDINT"
+              : single                            ? "REAL"
+                                                  : "LREAL",
+              false, false, true};
     }
     if (word == "true" || word == "false") {
       return {word == "true" ? "TRUE" : "FALSE", "BOOL", false, false, true};
@@ -1028,6 +1046,9 @@ class StTranslator {
     const bool named = own != functions_.end();
     if (const auto found = known.find(stem); found != known.end()) {
       text = found->second;
+      its_type = given[0].type;
+    } else if (stem == "cbrt") {
+      return {"EXPT(" + first + ", 1.0 / 3.0)", real_, false, false, true};
     } else if (stem == "expm1") {
       return {"(EXP(" + first + ") - 1.0)", real_, false, false, true};
     } else if (stem == "round" || stem == "ceil") {

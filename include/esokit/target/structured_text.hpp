@@ -63,9 +63,9 @@ status := UDINT_TO_UINT(o.status);
 inline constexpr const char* st_predictive = R"(IF no_y THEN
   u := $name_control_without_measurement(o := o);
 ELSE
-  u := $CONTROL(o := o, y := y);
+  u := $name_control(o := o, y := y);
 END_IF;
-flags := $PREPARE(o := o, next_r := next_r);
+flags := $name_prepare(o := o, next_r := next_r);
 status := UDINT_TO_UINT(flags);
 )";
 inline constexpr const char* st_observer = R"($HOLDIF resets THEN
@@ -84,157 +84,162 @@ ELSE
 END_IF;
 )";
 
-/// The function block of a design, and an error of the translation.
+/// A text, and what of its C could not be translated: a defect of esokit.
 struct StructuredText {
   std::string text{};
   std::string settings{};  ///< a function, with settings_in_struct
   std::string error{};
+  bool is_named = true;  ///< as the language allows
+
+  template <class V>
+  [[nodiscard]] Expected<std::string, Error<V>> expected(const std::string& which) const {
+    Rules<V> rules;
+    rules.require(is_named, "name", V(0),
+                  "must be no word of Structured Text, without two _ or one at its end");
+    rules.require(error.empty(), "structured_text", V(0),
+                  "cannot be written: its C has what is not translated (a defect of esokit)");
+    if (!rules) return rules.error();
+    return which;
+  }
+};
+
+/// A function block around translated functions. In its texts `$name` is the name of the design,
+/// `$real` REAL or LREAL.
+class StBlock {
+ public:
+  /// @param begins the function that gives the state its first values
+  StBlock(const CCode& code, const CodeOptions& options, bool single, const std::string& begins)
+      : translator(code.header + code.source, options.name), words_{{"$name", options.name}} {
+    translator.initial_from(options.name + begins);
+    const std::string& comment = options.comment;
+    words_.emplace_back("$real", single ? "REAL" : "LREAL");
+    words_.emplace_back("$COMMENT", comment.empty() ? "" : "   " + comment + "\n");
+  }
+
+  StTranslator translator;
+  std::string body{};
+
+  void input(const std::string& declared, const std::string& comment = "") {
+    inputs_ += line(declared, comment);
+  }
+  void output(const std::string& declared, const std::string& comment = "") {
+    outputs_ += line(declared, comment);
+  }
+  void own(const std::string& declared) { own_ += line(declared, ""); }
+
+  /// @param head a comment before all of it
+  [[nodiscard]] StructuredText text(const std::string& head) {
+    const std::string block =
+        filled("FUNCTION_BLOCK $name\nVAR_INPUT\n" + inputs_ + "END_VAR\nVAR_OUTPUT\n" + outputs_ +
+                   "END_VAR\nVAR\n  o : $name_state;\n" + own_ + "  done : BOOL;\nEND_VAR\n\n" +
+                   body + "END_FUNCTION_BLOCK\n",
+               words_);
+    translator.write_for(block);
+    const std::string& name = words_[0].second;
+    const bool is_named =
+        !StTranslator::is_taken(name) && name.back() != '_' && name.find("__") == std::string::npos;
+    return {filled(head, words_) + translator.text() + block, {}, translator.error, is_named};
+  }
+
+ private:
+  static std::string line(const std::string& declared, const std::string& comment) {
+    return "  " + declared + ";" + (comment.empty() ? "" : " (* " + comment + " *)") + "\n";
+  }
+  Words words_;
+  std::string inputs_{};
+  std::string outputs_{};
+  std::string own_{};
 };
 
 inline StructuredText structured_text(const RecordedDesign& design) {
   const ListWriter writer(c_language, design.single);
-  const CCode code = c_code(design);
   const std::string& name = design.options.name;
-  StTranslator translator(code.header + code.source, name);
-  translator.initial_from(name + "_init");
-  const std::string real = design.single ? "REAL" : "LREAL";
+  StBlock block(c_code(design), design.options, design.single, "_init");
   const auto number = [&](double x) { return StTranslator::number(writer.number(x)); };
   const bool controls = design.is_controller;
-  std::string inputs;
-  std::string outputs;
-  std::string own = "  o : $name_state;\n";
-  std::string body;
-  const auto variable = [&](std::string& where, const std::string& declared,
-                            const std::string& comment) {
-    where += "  " + filled(declared, {{"$real", real}}) + ";" +
-             (comment.empty() ? "" : " (* " + comment + " *)") + "\n";
-  };
-  const auto also = [&](const std::string& function) { return translator.root(function); };
-  variable(inputs, "y : $real", "the measurement");
-  variable(inputs, "no_y : BOOL", "TRUE: there is none at this sample");
+  block.input("y : $real", "the measurement");
+  block.input("no_y : BOOL", "TRUE: there is none at this sample");
   if (controls || design.predictive) {
-    variable(inputs, design.predictive ? "next_r : $real" : "r : $real",
-             design.predictive    ? "the reference at the next sample"
-             : design.compensates ? "u0 of the controller that is helped"
-                                  : "the reference");
-    variable(inputs, "u_held : $real", "what the actuator held, if starts or reports");
-    variable(inputs, "starts : BOOL",
-             "TRUE: takes over a plant at rest at y under u_held, before the sample");
-    variable(inputs, "reports : BOOL",
-             "TRUE: the actuator held u_held instead of u, before the sample");
-    variable(outputs, "u : $real", "to be held until the next sample");
-    variable(outputs, "start_status : UINT", "");
+    block.input(design.predictive ? "next_r : $real" : "r : $real",
+                design.predictive    ? "the reference at the next sample"
+                : design.compensates ? "u0 of the controller that is helped"
+                                     : "the reference");
+    block.input("u_held : $real", "what the actuator held, if starts or reports");
+    block.input("starts : BOOL",
+                "TRUE: takes over a plant at rest at y under u_held, before the sample");
+    block.input("reports : BOOL", "TRUE: the actuator held u_held instead of u, before the sample");
+    block.output("u : $real", "to be held until the next sample");
+    block.output("start_status : UINT");
   } else {
-    variable(inputs, "u : $real", "what the actuator held since the last sample");
-    variable(inputs, "resets : BOOL", "TRUE: restarts at (y, 0, .., 0) instead");
+    block.input("u : $real", "what the actuator held since the last sample");
+    block.input("resets : BOOL", "TRUE: restarts at (y, 0, .., 0) instead");
   }
   if (controls) {
-    variable(outputs, std::string("mode : UINT := ") + (design.loop.hold_left > 0 ? "1" : "0"),
-             "0: the law, 1: the start hold, 2: too many measurements are missing");
+    block.output(std::string("mode : UINT := ") + (design.loop.hold_left > 0 ? "1" : "0"),
+                 "0: the law, 1: the start hold, 2: too many measurements are missing");
   }
-  variable(outputs, "status : UINT", "");
+  block.output("status : UINT");
   if (design.options.settings_in_struct) {
-    variable(inputs, "settings : $name_settings", "others, of a design of the same structure");
-    variable(inputs, "adopts : BOOL", "TRUE: they count from this sample on");
-    variable(outputs, "adopted : BOOL", "FALSE: they are not of this structure, nothing changed");
-    body += st_adopt;
-    also(name + "_adopt");
+    block.input("settings : $name_settings", "others, of a design of the same structure");
+    block.input("adopts : BOOL", "TRUE: they count from this sample on");
+    block.output("adopted : BOOL", "FALSE: they are not of this structure, nothing changed");
+    block.body += st_adopt;
   }
   const bool guards = design.guard.on;
   if (guards) {
-    variable(inputs, "trust : $real := 1.0",
-             "0 .. 1: how much a correction of the disturbance counts");
-    variable(inputs, "pin : UINT",
-             "the actuator is at its limit: 1 upper, 2 lower, 3 by the sign of u; 0 at none");
-    variable(inputs, "holds : BOOL",
-             controls ? "TRUE: something else holds the plant under u_held at this sample"
-                      : "TRUE: something else holds the plant");
-    body += st_tell_guard;
-    also(name + "_set_trust");
-    also(name + "_set_pin");
-    if (!also(name + "_set_input_gain").empty()) {
+    block.input("trust : $real := 1.0", "0 .. 1: how much a correction of the disturbance counts");
+    block.input("pin : UINT",
+                "the actuator is at its limit: 1 upper, 2 lower, 3 by the sign of u; 0 at none");
+    block.input("holds : BOOL",
+                controls ? "TRUE: something else holds the plant under u_held at this sample"
+                         : "TRUE: something else holds the plant");
+    block.body += st_tell_guard;
+    if (block.translator.has(name + "_set_input_gain")) {
       const std::string gain = number(design.input_gain);
-      variable(inputs, "b0 : $real := " + gain, "");
-      variable(own, "b0_taken : $real := " + gain, "");
-      body += st_tell_gain;
+      block.input("b0 : $real := " + gain);
+      block.own("b0_taken : $real := " + gain);
+      block.body += st_tell_gain;
     }
-    also(name + "_hold");
     if (!controls) {
-      also(name + "_release");
-      variable(outputs, "u_to_give : $real", "while it is held");
+      block.output("u_to_give : $real", "while it is held");
     }
   }
-  if (controls || design.predictive) body += st_starts;
+  if (controls || design.predictive) block.body += st_starts;
   if (design.measured.on) {
-    variable(inputs, "w : $real", "the measured disturbance");
-    variable(inputs, "no_w : BOOL", "TRUE: there is none at this sample");
-    body += st_tell_measured;
-    also(name + "_measured");
+    block.input("w : $real", "the measured disturbance");
+    block.input("no_w : BOOL", "TRUE: there is none at this sample");
+    block.body += st_tell_measured;
   }
-  body += controls ? st_controller : design.predictive ? st_predictive : st_observer;
-  Words words;
-  if (controls || design.predictive) {
-    also(name + "_start");
-    const std::string applied = also(translator.has("applied") ? "applied" : name + "_applied");
-    words.emplace_back("$REPORT", std::string(design.predictive ? "flags" : "done") +
-                                      " := " + applied + "(o := o, u := u_held);");
-  }
-  if (design.predictive) {
-    also(name + "_control_without_measurement");
-    words.emplace_back("$CONTROL", also("control"));
-    words.emplace_back("$PREPARE", also("prepare"));
-  } else {
-    also(name + "_update");
-    if (controls) also(name + "_update_without_measurement");
-    if (!controls) also(name + "_predict");
-    if (!controls) also(name + "_reset");
-    words.emplace_back(
-        "$HOLD", !guards     ? (controls ? "IF" : "")
-                 : !controls ? st_hold_observer
-                             : std::string("IF holds THEN\n  u := $name_hold(o := o, y := y, ") +
-                                   (design.error_based ? "r := r, " : "") + "u := u_held);\nELSIF");
-  }
-  variable(own, "done : BOOL", "");
-  variable(own, "flags : UDINT", "");
-  also(name + "_estimate");
+  block.body += controls ? st_controller : design.predictive ? st_predictive : st_observer;
+  const std::string report = design.predictive ? "flags" : "done";
+  const std::string hold = std::string("IF holds THEN\n  u := $name_hold(o := o, y := y, ") +
+                           (design.error_based ? "r := r, " : "") + "u := u_held);\nELSIF";
+  block.own("flags : UDINT");
   for (int row = 0; row < design.size; ++row) {
     const std::string e = "e" + std::to_string(row);
-    variable(outputs, e + " : $real",
-             row == design.order  ? std::string("the disturbance")
-             : row < design.order ? "y" + std::string(static_cast<std::size_t>(row), '\'')
-                                  : std::string("an estimate"));
-    body += e + " := $name_estimate(o := o, row := " + std::to_string(row) + ");\n";
+    block.output(e + " : $real", row == design.order ? std::string("the disturbance")
+                                 : row < design.order
+                                     ? "y" + std::string(static_cast<std::size_t>(row), '\'')
+                                     : std::string("an estimate"));
+    block.body += e + " := $name_estimate(o := o, row := " + std::to_string(row) + ");\n";
   }
-  const auto& comment = design.options.comment;
-  words.insert(words.end(),
-               {{"$FLAGS", design.wrap.period > 0 ? ",\n   64 y was refused as an outlier, 128 y "
-                                                    "moved otherwise than before: its turn is "
-                                                    "uncertain"
-                           : design.gate.threshold > 0 || design.law.watches
-                               ? ",\n   64 y was refused as an outlier"
-                               : ""},
-                {"$TIME", number(design.sample_time)},
-                {"$GAIN", number(design.input_gain)},
-                {"$name", name},
-                {"$COMMENT", comment.empty() ? "" : "   " + comment + "\n"}});
-  const std::string block = "FUNCTION_BLOCK $name\nVAR_INPUT\n" + inputs + "END_VAR\nVAR_OUTPUT\n" +
-                            outputs + "END_VAR\nVAR\n" + own + "END_VAR\n\n" + body +
-                            "END_FUNCTION_BLOCK\n";
-  return {filled(st_head, words) + translator.text() + filled(block, words),
-          design.options.settings_in_struct ? translator.settings(design.options.settings_name)
-                                            : std::string(),
-          translator.error};
-}
-
-/// A text, or that what to_c wrote is not of the subset that is translated: a defect of esokit.
-template <class V>
-Expected<std::string, Error<V>> as_expected(const StructuredText& all,
-                                            std::string StructuredText::*which) {
-  Rules<V> rules;
-  rules.require(all.error.empty(), "structured_text", V(0),
-                "cannot be written: its C has what is not translated (a defect of esokit)");
-  if (!rules) return rules.error();
-  return all.*which;
+  const bool gates = design.gate.threshold > 0 || design.law.watches;
+  block.body = filled(block.body, {{"$REPORT", report + " := $name_applied(o := o, u := u_held);"},
+                                   {"$HOLD", !guards    ? (controls ? "IF" : "")
+                                             : controls ? hold
+                                                        : st_hold_observer}});
+  StructuredText all = block.text(filled(
+      st_head,
+      {{"$FLAGS", design.wrap.period > 0 ? ",\n   64 y was refused as an outlier, 128 y moved "
+                                           "otherwise than before: its turn is uncertain"
+                  : gates                ? ",\n   64 y was refused as an outlier"
+                                         : ""},
+       {"$TIME", number(design.sample_time)},
+       {"$GAIN", number(design.input_gain)}}));
+  if (design.options.settings_in_struct) {
+    all.settings = block.translator.settings(design.options.settings_name);
+  }
+  return all;
 }
 
 }  // namespace detail
@@ -251,8 +256,8 @@ Expected<std::string, Error<typename Object::scalar_type>> to_structured_text(
     const Object& object, const CodeOptions& options = {}) {
   const auto design = detail::recorded_design(object, options);
   if (!design) return design.error();
-  return detail::as_expected<typename Object::scalar_type>(detail::structured_text(*design),
-                                                           &detail::StructuredText::text);
+  const detail::StructuredText all = detail::structured_text(*design);
+  return all.template expected<typename Object::scalar_type>(all.text);
 }
 
 /// With CodeOptions::settings_in_struct: the settings of another design of the same structure, as a
@@ -263,8 +268,8 @@ Expected<std::string, Error<typename Object::scalar_type>> to_structured_setting
     const Object& object, const CodeOptions& options) {
   const auto design = detail::recorded_design(object, options);
   if (!design) return design.error();
-  return detail::as_expected<typename Object::scalar_type>(detail::structured_text(*design),
-                                                           &detail::StructuredText::settings);
+  const detail::StructuredText all = detail::structured_text(*design);
+  return all.template expected<typename Object::scalar_type>(all.settings);
 }
 
 }  // namespace esokit
