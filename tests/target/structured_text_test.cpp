@@ -17,8 +17,10 @@
 #include <esokit/observer/half_gain_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/model_eso.hpp>
+#include <esokit/target/health_code.hpp>
 #include <esokit/target/profile_code.hpp>
 #include <esokit/target/structured_text.hpp>
+#include <limits>
 #include <target/written.hpp>
 
 namespace esokit_test {
@@ -75,7 +77,7 @@ void interprets(const std::string& block, const Samples& samples) {
                    folder.file("samples") + " >/dev/null"));
 }
 
-constexpr int samples_each = 1500;
+const int samples_each = static_cast<int>(asked("ESOKIT_WRITTEN_SAMPLES", 1500));
 
 template <class V>
 V odd(Random& random, V usual) {
@@ -147,7 +149,7 @@ void controls_changed(std::uint64_t seed, const Change& change) {
     Samples samples(told.names() + "y no_y r u_held starts reports " + (guarded ? "holds " : "") +
                     ": u status mode start_status" + estimate_names(Observer::size));
     ChainPlant plant(C::order, 0.0078125, gain, 1.5);
-    Random random(seed++);
+    Random random(seed++ + asked("ESOKIT_WRITTEN_SEED", 0));
     V r(1);
     int lost = 0;
     int odd_ones = 0;
@@ -214,7 +216,7 @@ void observes_in_text(std::uint64_t seed) {
     constexpr bool guarded = Told<Observer, Observer>::guarded;
     Samples samples(told.names() + "y no_y u resets " + (guarded ? "holds " : "") + ": status" +
                     (guarded ? " u_to_give" : "") + estimate_names(Observer::size));
-    Random random(seed++);
+    Random random(seed++ + asked("ESOKIT_WRITTEN_SEED", 0));
     V to_give(0);
     for (int k = 0; k < samples_each; ++k) {
       const V y = odd(random, static_cast<V>(random.uniform(-1, 1)));
@@ -335,7 +337,7 @@ void predicts_in_text(std::uint64_t seed) {
     Samples samples("y no_y next_r u_held starts reports : u status start_status" +
                     estimate_names(Observer::size));
     ChainPlant plant(C::order, 0.0078125, gain, 1.5);
-    Random random(seed++);
+    Random random(seed++ + asked("ESOKIT_WRITTEN_SEED", 0));
     V r(1);
     int lost = 0;
     unsigned start_status = 0;
@@ -377,7 +379,7 @@ void moves_in_text(std::uint64_t seed) {
   std::string names;
   for (int i = 1; i <= Order; ++i) names += " r" + std::to_string(i);
   Samples samples("target resets : good moves r" + names);
-  Random random(seed);
+  Random random(seed + asked("ESOKIT_WRITTEN_SEED", 0));
   V target(1);
   int moving = 0;
   for (int k = 0; k < 4 * samples_each; ++k) {
@@ -403,6 +405,68 @@ TEST(StructuredText, OfProfiles) {
   moves_in_text<3, double>(721);
 }
 
+/// A monitor fed by the outputs of its controller's block, which equal what it looks at.
+template <class C>
+void monitors_in_text(double plant_gain, double bad, LoopFault fault, std::uint64_t seed) {
+  SCOPED_TRACE(testing::internal::GetTypeName<C>());
+  using V = typename C::scalar_type;
+  constexpr int size = ObserverOf<C>::size;
+  auto settings = config<C>(8);
+  settings.limits.rate = std::numeric_limits<V>::max();
+  C controller = C::make(settings).value();
+  auto watch = HealthMonitor<size, V>::make({.observer_bandwidth = V(30),
+                                             .sample_time = V(0.0078125),
+                                             .input_range = V(2.5),
+                                             .noise = V(1e-3)})
+                   .value();
+  const auto loop = to_structured_text(controller, {.name = "loop", .watched = true}).value();
+  const auto health = to_structured_text(watch, controller).value();
+  Samples of_loop("y no_y r : u innovation asked applied missed");
+  Samples of_health(
+      "innovation asked held applied disturbance missed its_status mode : fault gain_ratio "
+      "response "
+      "saturated");
+  ChainPlant plant(C::order, 0.0078125, 8 * plant_gain, 1.5);
+  Random random(seed + asked("ESOKIT_WRITTEN_SEED", 0));
+  V r(1);
+  int found = 0;
+  for (int k = 0; k < 6 * samples_each; ++k) {
+    plant.set_disturbance(std::sin(0.01 * k));
+    plant.step(static_cast<double>(controller.output()));
+    if (k % 3000 == 0) plant.set_state(std::vector<double>(C::order, 0.0));
+    if (random.index(60) == 0) r = static_cast<V>(random.uniform(-1, 1));
+    V y = static_cast<V>(plant.output() + 1e-3 * random.uniform(-1, 1));
+    if (random.uniform(0, 1) < bad) y = odd(random, hidden_nan<V>());
+    (void)controller.update(y, r);
+    watch.look(controller);
+    const auto& observer = controller.observer();
+    const V values[] = {observer.innovation(), controller.requested(), controller.output(),
+                        observer.applied_input()};
+    const auto missed = static_cast<unsigned>(observer.missed());
+    of_loop.number(y).count(0).number(r).number(values[2]).number(values[0]).number(values[1]);
+    of_loop.number(values[3]).count(missed).word("\n");
+    for (const V value : values) of_health.number(value);
+    of_health.number(observer.template estimate<C::order>()).count(missed);
+    of_health.count(static_cast<unsigned>(controller.status()));
+    of_health.count(static_cast<unsigned>(controller.mode()));
+    const auto& seen = watch.health();
+    of_health.count(static_cast<unsigned>(diagnose(seen))).number(seen.gain_ratio);
+    of_health.number(seen.response).number(seen.saturated).word("\n");
+    found += diagnose(seen) == fault;
+  }
+  EXPECT_GT(found, samples_each / 10);
+  interprets(loop, of_loop);
+  interprets(health, of_health);
+}
+
+TEST(StructuredText, OfMonitors) {
+  if (!there("python3")) GTEST_SKIP() << "no python3";
+  monitors_in_text<Adrc<LinearEso<2, double>>>(1, 0.02, LoopFault::none, 801);
+  monitors_in_text<Adrc<LinearEso<2, double>>>(-1, 0, LoopFault::wrong_sign, 811);
+  monitors_in_text<Adrc<LinearEso<1, float>>>(6, 0, LoopFault::innovation_too_large, 821);
+  monitors_in_text<Adrc<CascadeEso<1, 2, float>>>(1, 0.3, LoopFault::measurements_rejected, 831);
+}
+
 /// Settings that change while it runs, as by `adopt`.
 template <class C>
 void adopts_in_text(std::uint64_t seed) {
@@ -426,7 +490,7 @@ void adopts_in_text(std::uint64_t seed) {
   sets += to_structured_settings(third, options).value();
   Samples samples("y no_y r settings adopts : u adopted" + estimate_names(ObserverOf<C>::size));
   ChainPlant plant(C::order, 0.0078125, 8, 1.5);
-  Random random(seed);
+  Random random(seed + asked("ESOKIT_WRITTEN_SEED", 0));
   bool adopted = false;
   for (int k = 0; k < samples_each; ++k) {
     plant.step(static_cast<double>(controller.output()));

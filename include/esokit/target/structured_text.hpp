@@ -223,6 +223,15 @@ inline StructuredText structured_text(const RecordedDesign& design) {
                                      : std::string("an estimate"));
     block.body += e + " := $name_estimate(o := o, row := " + std::to_string(row) + ");\n";
   }
+  if (design.options.watched && controls) {
+    block.output("innovation : $real", "what a HealthMonitor takes, and the next three");
+    block.output("asked : $real");
+    block.output("applied : $real");
+    block.output("missed : UINT");
+    block.body +=
+        "innovation := o.innovation;\nasked := o.u_asked;\napplied := o.u_applied;\n"
+        "missed := UDINT_TO_UINT(o.gap);\n";
+  }
   const bool gates = design.gate.threshold > 0 || design.law.watches;
   block.body = filled(block.body, {{"$REPORT", report + " := $name_applied(o := o, u := u_held);"},
                                    {"$HOLD", !guards    ? (controls ? "IF" : "")
