@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <cstddef>
 #include <cstdlib>
 #include <esokit/target/list_writer.hpp>
@@ -978,14 +979,12 @@ class StTranslator {
     }
     if (std::isdigit(static_cast<unsigned char>(word[0])) != 0) {
       const std::string text = number(word);
-      // Not each compiler takes an LREAL beyond what a REAL holds.
-      if (text == "1.7976931348623157E+308") {
-        return far("largest", "255.99999999999997", "1.7014118346046923E+38");
-      }
-      if (text == "2.2250738585072014E-308") {
-        return far("smallest", "0.00006103515625", "1.1754943508222875E-38");
-      }
       const bool single = word.back() == 'f' && word[1] != 'x';
+      if (!single && text.find('.') != std::string::npos) {
+        const double value = std::strtod(word.c_str(), nullptr);
+        const double size = std::abs(value);
+        if (size > 1e37 || (size > 0 && size < 1e-37)) return scaled(value);
+      }
       return {text,
               text.find('.') == std::string::npos ? "UDINT"
               : single                            ? "REAL"
@@ -1089,21 +1088,27 @@ class StTranslator {
     if (!helpers_.insert(name).second) return name;
     text_ += "FUNCTION " + name + " : " + its_type + "\nVAR_INPUT\n  " +
              (inputs.empty() ? "x : " + real_ : inputs) + ";\nEND_VAR\n" +
-             (own.empty() ? "" : "VAR\n  " + own + " : " + real_ + ";\nEND_VAR\n") +
-             filled(body, {{"$f", name}}) + "END_FUNCTION\n\n";
+             (own.empty() ? "" : "VAR\n  " + own + ";\nEND_VAR\n") + filled(body, {{"$f", name}}) +
+             "END_FUNCTION\n\n";
     return name;
   }
-  /// The factor times the eighth power of the other one, exactly.
-  Value far(const std::string& stem, const std::string& factor, const std::string& power) {
-    return {helper(stem, "LREAL", "", "",
-                   filled("  $f := x * $F * $A * $A * $A * $A * $A * $A * $A * $A; (* x is 1 *)\n",
-                          {{"$F", factor}, {"$A", power}})) +
-                "(1.0)",
+  /// An LREAL beyond what a REAL holds, which not each compiler takes: times a power of 2^126.
+  Value scaled(double value) {
+    const bool up = std::abs(value) > 1;
+    const double by = up ? 0x1p-126 : 0x1p126;
+    int times = 0;
+    for (; std::abs(value) > 1e37 || std::abs(value) < 1e-37; ++times) value *= by;
+    const std::string name = helper(
+        up ? "scaled_up" : "scaled_down", "LREAL", "x : LREAL;\n  times : UDINT", "i : UDINT",
+        std::string("  $f := x;\n  FOR i := 1 TO times DO\n    $f := $f * ") +
+            (up ? "8.507059173023462E+37" : "1.1754943508222875E-38") + ";\n  END_FOR;\n");
+    return {name + "(x := " + number(ListWriter(c_language, false).number(value)) +
+                ", times := " + std::to_string(times) + ")",
             "LREAL", false, false, true};
   }
   /// To the nearest whole number, a half away from zero, or up: not a function of each PLC.
   std::string rounding(const std::string& stem) {
-    return helper(stem, real_, "", "size, whole",
+    return helper(stem, real_, "", "size, whole : " + real_,
                   filled("  size := ABS(x);\n"
                          "  IF NOT (size < $W) THEN\n"
                          "    $f := x; (* it has no fraction *)\n"
