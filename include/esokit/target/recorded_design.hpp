@@ -394,8 +394,9 @@ struct RecordAccess {
         law.bracket_ = S(0.0);
         return nothing;
       });
-      add("anchor_take", {"power", "contraction"}, false,
-          [=](Law& law, const auto& in) { return law.anchor_take(in[0], in[1]), nothing; });
+      add("anchor_take", {"power", "contraction"}, false, [=](Law& law, const auto& in) {
+        return Law::anchor_take(law.power_, law.bracket_, in[0], in[1]), nothing;
+      });
       add("anchor_contraction", {"power", "contraction"}, true,
           [](Law&, const auto& in) { return S(in[1] + in[0] * in[1]); });
       add("anchor_power", {"power", "contraction"}, true,
