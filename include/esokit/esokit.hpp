@@ -17,6 +17,7 @@
 #include <esokit/analysis/eigenvalues.hpp>
 #include <esokit/analysis/error_bound.hpp>
 #include <esokit/analysis/frequency_response.hpp>
+#include <esokit/analysis/health_text.hpp>
 #include <esokit/analysis/linear_controller.hpp>
 #include <esokit/analysis/linear_system.hpp>
 #include <esokit/analysis/loop.hpp>
@@ -40,11 +41,9 @@
 #include <esokit/control/experiment.hpp>
 #include <esokit/control/gain_probe.hpp>
 #include <esokit/control/health.hpp>
-#include <esokit/control/health_text.hpp>
 #include <esokit/control/limiter.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/control/nonlinear_feedback.hpp>
-#include <esokit/control/pid_conversion.hpp>
 #include <esokit/control/predictive_adrc.hpp>
 #include <esokit/control/reference.hpp>
 #include <esokit/control/smooth_profile.hpp>
@@ -63,7 +62,6 @@
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/pack.hpp>
 #include <esokit/core/packed.hpp>
-#include <esokit/core/recording.hpp>
 #include <esokit/core/scalar.hpp>
 #include <esokit/core/snapshot.hpp>
 #include <esokit/core/snapshot_text.hpp>
@@ -193,12 +191,14 @@
 #include <esokit/target/profile_code.hpp>
 #include <esokit/target/recorded_design.hpp>
 #include <esokit/target/recorder.hpp>
+#include <esokit/target/recording.hpp>
 #include <esokit/target/structured_text.hpp>
 #include <esokit/tune/controller.hpp>
 #include <esokit/tune/controller_source.hpp>
 #include <esokit/tune/families.hpp>
 #include <esokit/tune/loop_cost.hpp>
 #include <esokit/tune/lqg.hpp>
+#include <esokit/tune/pid_conversion.hpp>
 #include <esokit/tune/plain_pid.hpp>
 #include <esokit/tune/play.hpp>
 #include <esokit/tune/problem.hpp>
