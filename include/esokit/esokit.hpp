@@ -3,6 +3,7 @@
 #pragma once
 
 #include <esokit/adapter/adapter.hpp>
+#include <esokit/adapter/correction_weights.hpp>
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/guarded.hpp>
 #include <esokit/adapter/known_model.hpp>
@@ -123,6 +124,7 @@
 #include <esokit/model/augmented_model.hpp>
 #include <esokit/model/chain_model.hpp>
 #include <esokit/model/corrected_part.hpp>
+#include <esokit/model/disturbance_constant.hpp>
 #include <esokit/model/integrator_chain.hpp>
 #include <esokit/model/linear_plant.hpp>
 #include <esokit/model/matrix_model.hpp>
