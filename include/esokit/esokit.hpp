@@ -6,6 +6,7 @@
 #include <esokit/adapter/correction_weights.hpp>
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/guarded.hpp>
+#include <esokit/adapter/guarded_states.hpp>
 #include <esokit/adapter/known_model.hpp>
 #include <esokit/adapter/measured.hpp>
 #include <esokit/adapter/outlier_gate.hpp>

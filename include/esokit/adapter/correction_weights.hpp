@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <esokit/core/scalar.hpp>
 #include <esokit/core/unroll.hpp>
+#include <esokit/gain/step_status.hpp>
 
 namespace esokit {
 
@@ -35,6 +36,11 @@ struct CorrectionWeights {
   std::uint16_t release_left = 0;
   int settling_left = 0;  ///< since the last sample held, see Holding
 
+  /// Whether there was no correction.
+  [[nodiscard]] static constexpr bool refused(StepStatus status) noexcept {
+    return has(status, StepStatus::measurement_rejected | StepStatus::outlier_rejected);
+  }
+
   /// @param positive the sign of b0 @param leaks whether dhat leaks
   ESOKIT_COLD void weigh(bool positive, bool leaks) noexcept {
     const bool one_sided = pin != Pin::free || release_left > 0;
@@ -59,6 +65,12 @@ struct CorrectionWeights {
       release_left = release_samples;
     }
     pin = where;
+  }
+
+  /// The plant stood until now. @param settling_samples until the observer has settled
+  constexpr void stand_for(int settling_samples) noexcept {
+    settling_left = settling_samples;
+    frozen = unsettled = false;
   }
 
   /// True if the next correction is the first that is scaled before the observer has settled:

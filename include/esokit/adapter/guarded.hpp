@@ -3,62 +3,14 @@
 /// with a constant gain.
 #pragma once
 
-#include <cmath>
 #include <cstdint>
 #include <esokit/adapter/adapter.hpp>
 #include <esokit/adapter/correction_weights.hpp>
+#include <esokit/adapter/guarded_states.hpp>
 #include <esokit/core/type_tag.hpp>
-#include <esokit/gain/gating_certificate.hpp>
-#include <esokit/model/corrected_part.hpp>
-#include <esokit/model/disturbance_constant.hpp>
-#include <esokit/model/sampled_model.hpp>
 #include <limits>
-#include <tuple>
-#include <type_traits>
-#include <utility>
 
 namespace esokit {
-
-namespace detail {
-
-struct GuardAccess {
-  /// The observer inside all adapters.
-  template <class O>
-  static constexpr auto& innermost(O& o) noexcept {
-    using Plain = std::remove_const_t<O>;
-    if constexpr (observer_traits<Plain>.adapts) {
-      using Base = Adapter<typename Plain::Adapted>;
-      using Same = std::conditional_t<std::is_const_v<O>, const Base, Base>;
-      return innermost(static_cast<Same&>(o).observer_);
-    } else {
-      return o;
-    }
-  }
-  /// The scaled states of the observer, level by level.
-  template <class O>
-  static constexpr auto& states(O& o) noexcept {
-    return innermost(o).kept_.states;
-  }
-  /// The share of the innovation by which the next correction moves the measured value.
-  template <class O>
-  static constexpr auto measured_gain(const O& o) noexcept {
-    const auto& inner = innermost(o);
-    return std::get<0>(inner.law_gain(inner.laws_[0], {}, inner.elapsed()));
-  }
-  /// True if all estimates that belong to these states are finite.
-  template <class O, class States>
-  static constexpr bool finite(const O& o, const States& states) noexcept {
-    return is_finite(innermost(o).probe(states));
-  }
-};
-
-}  // namespace detail
-
-/// The unit in which dhat stays constant when b0 changes, and in which its bound is given.
-enum class DisturbanceUnit : unsigned char {
-  output,  ///< unit of y^(n): a force, which does not depend on b0
-  input,   ///< unit of u: a bias of the actuator, which is multiplied by b0
-};
 
 /// Config of Guarded.
 template <LoopObserver Observer>
@@ -154,22 +106,15 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   using Base::observer_;
   using S = typename Observer::scalar_type;
   static constexpr int n = Observer::order;
-  using Model = std::remove_cvref_t<decltype(std::declval<const Observer&>().model())>;
-  using Constant = detail::DisturbanceConstant<Model, S>;
+  using Guards = detail::GuardedStates<Observer>;
+  using Model = typename Guards::Model;
   static constexpr bool varies_time = observer_traits<Observer>.varies_time;
   static constexpr bool takes_measured = observer_traits<Observer>.takes_measured;
   static constexpr bool on_chain = model_traits<Model>.is_chain;
   static_assert(on_chain || !varies_time,
                 "esokit: with a model Guarded needs a fixed sample time: not with "
                 "VariableTime");
-  static constexpr bool turns_move_constant = [] {
-    if constexpr (on_chain || !observer_traits<Observer>.bears_guards) {
-      return false;
-    } else {
-      return Model::parts.plant_poles && observer_traits<Observer>.wraps_output;
-    }
-  }();
-  static_assert(!turns_move_constant,
+  static_assert(!Guards::turns_move_constant(),
                 "esokit: with the poles of a plant a whole turn is a step of the constant: Guarded "
                 "takes WrappedOutput without plant_poles");
 
@@ -199,7 +144,9 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     if (!made) return made.error();
     if constexpr (gates) {
       for (int level = 0; level < levels; ++level) {
-        if (auto ok = made->prove(level); !ok) return ok.error();
+        const auto samples = Guards::settling_samples(made->observer_, level, made->set_.leak);
+        if (!samples) return samples.error();
+        if (*samples > made->set_.settling_samples) made->set_.settling_samples = *samples;
       }
     }
     return *made;
@@ -227,7 +174,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
         return predict_standing(u_applied);
     }
     const StepStatus status = observer_.predict(S(u_applied * told_ratio_));
-    if constexpr (takes_measured) keep_bound();
+    if (takes_measured) keep_bound();
     take_gain();
     return status;
   }
@@ -283,7 +230,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
 
   /// The u under which the plant would stand still if d were dhat.
   [[nodiscard]] S holding_input() const noexcept requires gates {
-    const S u = Constant::holding(observer_) * (set_.inverse_gain * input_factor_);
+    const S u = Guards::Constant::holding(observer_) * (set_.inverse_gain * input_factor_);
     return is_finite(u) ? u : applied_input();
   }
 
@@ -326,34 +273,13 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   /// time after a pin.
   [[nodiscard]] bool gated() const noexcept { return weights_.gated; }
   /// True if dhat is at its bound.
-  [[nodiscard]] bool bounded() const noexcept {
-    S sum{};
-    for (const auto& level : detail::GuardAccess::states(observer_)) {
-      sum = sum + constant().of(level);
-      if (constant().reaches(level, sum, limit())) return true;
-    }
-    return false;
-  }
+  [[nodiscard]] bool bounded() const noexcept { return set_.guarded.bounded(observer_, limit()); }
   /// The share of dhat that the leak removes after each correction, 0 .. 1.
   [[nodiscard]] const S& leak_share() const noexcept { return set_.leak; }
   /// The steady error x - xhat caused by the leak, for a constant y and a constant d = 1 (unit of
   /// y^(n)): (y, .., d), N x 1. Zero without a leak.
   [[nodiscard]] Estimate leak_error() const noexcept requires gates {
-    if (!(set_.leak > S(0))) return Estimate::Zero();
-    const auto& model = observer_.model();
-    const S d = Constant::scaled(model, S(1));
-    if constexpr (on_chain) {
-      Array<ScaledGain<size, S>, levels> gains;
-      for (int i = 0; i < levels; ++i) gains[static_cast<std::size_t>(i)] = observer_.level_gain(i);
-      return model.physical(detail::leak_error<n, S>(gains, set_.leak, d));
-    } else {
-      return with_level(0, [&](const auto& part, const auto& level) {
-        const auto all = part.whole * level.leak_error(set_.leak, d);
-        typename Model::State x{};
-        for (int i = 0; i < size; ++i) x[static_cast<std::size_t>(i)] = all(i);
-        return model.physical(x);
-      });
-    }
+    return set_.leak > S(0) ? Guards::leak_error(observer_, set_.leak) : Estimate(Estimate::Zero());
   }
 
   /// The present b0, unit of y^(n) per unit of u.
@@ -364,16 +290,12 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
 
   /// Adds `offset` to dhat, limited to the bound, see PredictorCorrector.
   StepStatus shift_disturbance(const S& offset) noexcept requires ShiftableDisturbance<Observer> {
-    const StepStatus status = observer_.shift_disturbance(offset);
-    if (status == StepStatus::ok) keep_bound();
-    return status;
+    return bounded_after(observer_.shift_disturbance(offset));
   }
 
   /// Adds `offset` to the load, limited to the bound, see PredictorCorrector.
   StepStatus shift_load(const S& offset) noexcept requires ShiftableLoad<Observer> {
-    const StepStatus status = observer_.shift_load(offset);
-    if (status == StepStatus::ok) keep_bound();
-    return status;
+    return bounded_after(observer_.shift_load(offset));
   }
 
   /// As of Measured, with dhat limited to the bound.
@@ -407,8 +329,8 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
       : Base(observer),
         set_{config.disturbance_bound,
              S(1) / chain_config<Observer>(config.observer).input_gain,
-             leak_of(config),
-             Constant(observer.model()),
+             Guards::leak_share(config),
+             Guards(observer.model()),
              config.unit,
              static_cast<std::uint16_t>(config.release_samples)} {
     set_weights();
@@ -434,15 +356,10 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
         .not_negative("leak_time", config.leak_time)
         .require(gates || !(config.leak_time > S(0)), "leak_time", config.leak_time,
                  "must be 0 with an extension above 1 or a varying sample time")
-        .require(!(config.leak_time > S(0)) || leak_of(config) >= std::numeric_limits<S>::epsilon(),
+        .require(!(config.leak_time > S(0)) ||
+                     Guards::leak_share(config) >= std::numeric_limits<S>::epsilon(),
                  "leak_time", config.leak_time,
                  "is too long: what leaks in one sample is below the rounding of the scalar");
-  }
-
-  /// The share of dhat that is removed after each correction.
-  static S leak_of(const Config& config) {
-    if (!(config.leak_time > S(0))) return S(0);
-    return -std::expm1(-chain_config<Observer>(config.observer).sample_time / config.leak_time);
   }
 
   /// b0 of the config. (Of a model with an actuator input_gain() is b0 / tau.)
@@ -450,63 +367,9 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     return on_chain ? observer_.input_gain() : S(S(1) / set_.inverse_gain);
   }
 
-  [[nodiscard]] const Constant& constant() const noexcept { return set_.constant; }
-
-  /// Calls `use(part, level)` with the corrected part of the model, including all of its sensor.
-  /// The part of a chain is all of it.
-  template <class Use>
-  auto with_level([[maybe_unused]] int level, const Use& use) const {
-    if constexpr (on_chain) {
-      return use(observer_.model(), detail::ConstantLevel<size, S>(observer_.level_gain(level)));
-    } else {
-      const auto& model = observer_.model();
-      const auto run = [&](const auto& part) {
-        return use(part, detail::ConstantLevel(part, model, observer_.level_gain(0)));
-      };
-      using Settings = std::remove_cvref_t<decltype(chain_config<Observer>(
-          std::declval<const typename Observer::Config&>()))>;
-      if constexpr (requires(const Settings& settings) { settings.poles; }) {
-        return run(corrected_whole(model));
-      } else {
-        return model.with_corrected_part((std::numeric_limits<S>::max)(), run);
-      }
-    }
-  }
-
-  /// Refuses a level that is not proven stable, and notes how long it settles.
-  Check<S> prove(int level) {
-    const auto error = [level](const char* why) {
-      return Error<S>{"level", static_cast<S>(level), why};
-    };
-    return with_level(level, [&](const auto&, const auto& corrected) -> Check<S> {
-      bool certified;
-      if constexpr (on_chain) {
-        certified = gating_certified<size, S>(corrected.gain, set_.leak);
-      } else {
-        certified = gating_certified(corrected, set_.leak);
-      }
-      if (!certified) {
-        return error(
-            "has a gain that is not proven stable if corrections of dhat are scaled: Re G > -1 "
-            "fails");
-      }
-      const Holding held = holding(corrected, set_.leak > S(0));
-      if (!held.stable) {
-        return error("has a gain that is not proven stable if the plant is held and released");
-      }
-      if (held.settling > set_.settling_samples) set_.settling_samples = held.settling;
-      return {};
-    });
-  }
-
   /// The states under another b0.
   [[nodiscard]] auto rescaled(const S& factor) const noexcept {
-    auto states = detail::GuardAccess::states(observer_);
-    for (auto& level : states) {
-      level = constant().rescaled(observer_.model(), level, factor,
-                                  set_.unit == DisturbanceUnit::input);
-    }
-    return states;
+    return set_.guarded.rescaled(observer_, factor, set_.unit == DisturbanceUnit::input);
   }
 
   /// Whether the next sample has another b0.
@@ -529,90 +392,48 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
 
   /// After a restart at a given estimate.
   StepStatus begin(StepStatus status) noexcept {
-    if (status == StepStatus::ok) {
-      weights_.settling_left = 0;
-      weights_.frozen = false;
-      settle(true);
-      keep_bound();
-    }
+    if (status == StepStatus::ok) stand_for(0);
+    return bounded_after(status);
+  }
+  StepStatus bounded_after(StepStatus status) noexcept {
+    if (status == StepStatus::ok) keep_bound();
     return status;
   }
-
-  void settle(bool settled) noexcept {
-    weights_.unsettled = !settled;
+  void stand_for(int settling_samples) noexcept {
+    weights_.stand_for(settling_samples);
     set_weights();
-  }
-
-  [[nodiscard]] static constexpr bool refused(StepStatus status) noexcept {
-    return has(status, StepStatus::measurement_rejected | StepStatus::outlier_rejected);
-  }
-
-  /// Puts each level at rest at y, with its disturbance.
-  template <class States>
-  void stand(const States& with, const S& y) noexcept {
-    States still = with;
-    for (auto& level : still) level = constant().standing(observer_.model(), level, y);
-    if (detail::GuardAccess::finite(observer_, still)) {
-      detail::GuardAccess::states(observer_) = still;
-    }
   }
 
   /// Prediction while held: d and the actuator continue, and the sensor follows a constant y.
   ESOKIT_COLD StepStatus predict_standing(S u_applied) noexcept requires gates {
-    constexpr auto y = static_cast<std::size_t>(Model::state_of_row(0));
-    auto& states = detail::GuardAccess::states(observer_);
-    const auto before = states;
+    const auto before = detail::GuardAccess::states(observer_);
     const StepStatus status = observer_.predict(S(u_applied * told_ratio_));
     if (!has(status, StepStatus::prediction_dropped)) {
-      const auto& model = observer_.model();
-      // The shift of y by an adapter.
-      const S u = detail::GuardAccess::innermost(observer_).applied_input();
-      const S turns = states[0][y] - model.predict(before[0], model.drive(u))[y];
-      auto still = before[0];
-      for (std::size_t i = y + 1; i < still.size(); ++i) {
-        const bool moves = i < y + n || i > y + Model::order;  // a derivative of y, or a sine
-        if (moves && (still[i] < S(0) || still[i] > S(0))) settle(false);
-        still[i] = S(0);
-      }
-      stand(states, S(before[0][y] + turns));
-      if constexpr (y > 0) {
-        still = model.predict(still, model.drive(S(0)));
-        for (std::size_t i = 0; i < y; ++i) states[0][i] = still[i] + (i == 0 ? turns : S(0));
-      }
+      if (set_.guarded.stand_still(observer_, before)) weights_.unsettled = true;
+      set_weights();
     }
-    if constexpr (takes_measured) keep_bound();
+    if (takes_measured) keep_bound();
     take_gain();
     return status;
   }
 
   /// Correction while held: y is what is measured, and dhat stays.
   ESOKIT_COLD StepStatus correct_standing(S y) noexcept requires gates {
-    const auto& inner = detail::GuardAccess::innermost(observer_);
     const auto before = detail::GuardAccess::states(observer_);
     const S left = S(1) - detail::GuardAccess::measured_gain(observer_);
     const StepStatus status = observer_.correct(y);
-    if (!refused(status)) {
-      weights_.settling_left = set_.settling_samples;
-      weights_.frozen = false;
-      settle(true);
-      // y itself, in the turn in which an adapter has put it.
-      stand(before, S(detail::GuardAccess::states(observer_)[0][0] + left * inner.innovation()));
+    if (!weights_.refused(status)) {
+      stand_for(set_.settling_samples);
+      set_.guarded.stand_at_measurement(observer_, before, left);
     }
     // What stands has no correction to scale, also after a restart.
     keep_guards(found(), status);
     return status;
   }
 
-  /// The disturbance states, level by level.
-  using Found = Array<S, Base::levels>;
+  using Found = typename Guards::Found;
   [[nodiscard]] ESOKIT_INLINE Found found() const noexcept {
-    Found all{};
-    if (!on_chain && !weights_.acts) return all;
-    const auto& states = detail::GuardAccess::states(observer_);
-    detail::unroll<levels>([&](auto level) ESOKIT_INLINE_LAMBDA {
-      std::get<level>(all) = constant().of(std::get<level>(states));
-    });
-    return all;
+    return on_chain || weights_.acts ? set_.guarded.found(observer_) : Found{};
   }
 
   /// Applies the guards after a correction. @param before dhat of the levels before it, which no
@@ -622,107 +443,48 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
       if (weights_.acts) [[unlikely]] {
         if (weights_.freezes(set_.settling_samples)) set_weights();
         // After a restart the old dhat is meaningless.
-        if (weights_.gated && !has(status, StepStatus::restarted)) gate(before);
-        if (!refused(status)) {
-          for (auto& level : detail::GuardAccess::states(observer_)) {
-            const S d = constant().of(level);
-            put(level, d, S(d - set_.leak * d));
-          }
+        if (weights_.gated && !has(status, StepStatus::restarted)) {
+          set_.guarded.gate(observer_, before, weights_.up, weights_.down);
+        }
+        if (!weights_.refused(status)) {
+          set_.guarded.leak(observer_, set_.leak);
           if (weights_.counts_down()) set_weights();
         }
       }
     }
     // With a model a refused measurement changes nothing, not even by rounding.
-    if (!on_chain && refused(status)) return;
-    if (beyond_bound()) [[unlikely]]
+    if (!on_chain && weights_.refused(status)) return;
+    if (set_.guarded.beyond(observer_, limit())) [[unlikely]]
       keep_bound();
   }
-
-  template <class State>
-  ESOKIT_INLINE void put(State& state, const S& now, const S& value) const noexcept {
-    constant().put(observer_.model(), state, now, value);
-  }
-
-  /// Takes back the part of the correction that does not count.
-  ESOKIT_INLINE void gate(const Found& before) noexcept {
-    auto& states = detail::GuardAccess::states(observer_);
-    detail::unroll<levels>([&](auto level) ESOKIT_INLINE_LAMBDA {
-      auto& state = std::get<level>(states);
-      const S d = constant().of(state);
-      const S moved = d - std::get<level>(before);
-      const S& weight = moved > S(0) ? weights_.up : weights_.down;
-      put(state, d, S(std::get<level>(before) + weight * moved));
-    });
-  }
+  ESOKIT_COLD void keep_bound() noexcept { set_.guarded.keep_bound(observer_, limit()); }
 
   void set_weights() noexcept { weights_.weigh(observer_.input_gain() > S(0), set_.leak > S(0)); }
 
   void set_limit() noexcept {
-    const S most = (std::numeric_limits<S>::max)();
-    S bound = set_.bound;
-    if (set_.unit == DisturbanceUnit::input) {
-      bound = bound * detail::absolute(S(configured_gain() * gain_ratio_));
-    }
-    bound_in_force_ = bound > S(0) && is_finite(bound) ? bound : most;
-    limit_ = scaled_limit();
-  }
-
-  [[nodiscard]] S scaled_limit() const noexcept {
-    const S most = (std::numeric_limits<S>::max)();
-    const S scaled = Constant::scaled(observer_.model(), bound_in_force_);
-    return bound_in_force_ < most && is_finite(scaled) ? scaled : most;
+    const bool by_input = set_.unit == DisturbanceUnit::input;
+    const S present = by_input ? detail::absolute(S(configured_gain() * gain_ratio_)) : S(1);
+    bound_in_force_ = set_.bound * present;
+    limit_ = Guards::limit(observer_, bound_in_force_);
   }
 
   /// The bound in the scaling of the states.
-  [[nodiscard]] S limit() const noexcept { return varies_time ? scaled_limit() : limit_; }
-
-  [[nodiscard]] ESOKIT_INLINE bool beyond_bound() const noexcept {
-    const S most = limit();
-    if (!on_chain && !(most < (std::numeric_limits<S>::max)())) return false;
-    const auto& states = detail::GuardAccess::states(observer_);
-    S sum = constant().of(std::get<0>(states));
-    bool beyond = detail::absolute(sum) > most;
-    detail::unroll<levels - 1>([&](auto below) ESOKIT_INLINE_LAMBDA {
-      sum = sum + constant().of(std::get<below + 1>(states));
-      beyond = beyond || detail::absolute(sum) > most;
-    });
-    return beyond;
-  }
-
-  /// Limits the dhat of each level, summed with the levels below it, to the bound.
-  ESOKIT_COLD void keep_bound() noexcept {
-    const S most = limit();
-    S below{};
-    for (auto& level : detail::GuardAccess::states(observer_)) {
-      const S d = constant().of(level);
-      const S sum = below + d;
-      if (constant().beyond(level, sum, most)) {
-        const S end = sum > S(0) ? most : S(-most);
-        put(level, d, S(end - below));
-        if constexpr (on_chain && size > n + 1) {
-          // The slopes of the levels are not distinguished: the slope of this one must not lead out
-          // of the bound.
-          if (level[n + 1] * end > S(0)) {
-            for (std::size_t r = n + 1; r < size; ++r) level[r] = S(0);
-          }
-        }
-      }
-      below = below + constant().of(level);
-    }
+  [[nodiscard]] S limit() const noexcept {
+    return varies_time ? Guards::limit(observer_, bound_in_force_) : limit_;
   }
 
   /// What a retune replaces.
   struct Set {
-    S bound;         ///< in the unit of the config
-    S inverse_gain;  ///< 1 / b0 of the config
-    S leak;          ///< share of dhat that is removed after each correction
-    [[no_unique_address]] Constant constant;  ///< of a model
+    S bound;                               ///< in the unit of the config
+    S inverse_gain;                        ///< 1 / b0 of the config
+    S leak;                                ///< share of dhat that is removed after each correction
+    [[no_unique_address]] Guards guarded;  ///< of a model
     DisturbanceUnit unit;
     std::uint16_t release_samples;
     int settling_samples = 0;  ///< see Holding
   };
 
-  S bound_in_force_;       ///< unit of y^(n), at the present b0
+  S bound_in_force_;       ///< unit of y^(n), at the present b0; 0: none
   S limit_;                ///< the same, scaled
   S gain_ratio_ = S(1);    ///< present b0 divided by b0 of the config
   S told_ratio_ = S(1);    ///< gain_ratio when the law computed the u that comes next

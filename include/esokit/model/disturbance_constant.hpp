@@ -11,6 +11,12 @@
 
 namespace esokit {
 
+/// The unit in which dhat stays constant when b0 changes, and in which its bound is given.
+enum class DisturbanceUnit : unsigned char {
+  output,  ///< unit of y^(n): a force, which does not depend on b0
+  input,   ///< unit of u: a bias of the actuator, which is multiplied by b0
+};
+
 namespace detail {
 
 /// Access to the constant of the disturbance in the states: for a chain this is dhat itself.
