@@ -41,6 +41,7 @@
 #include <esokit/control/cycle_analysis.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/control/experiment.hpp>
+#include <esokit/control/experiment_config.hpp>
 #include <esokit/control/gain_probe.hpp>
 #include <esokit/control/health.hpp>
 #include <esokit/control/limiter.hpp>
@@ -97,6 +98,7 @@
 #include <esokit/gain/riccati.hpp>
 #include <esokit/gain/riccati_gain.hpp>
 #include <esokit/gain/riccati_gain_design.hpp>
+#include <esokit/gain/riccati_settings.hpp>
 #include <esokit/gain/sampled_gain.hpp>
 #include <esokit/gain/scheduled_gain.hpp>
 #include <esokit/gain/step_status.hpp>
@@ -131,7 +133,9 @@
 #include <esokit/model/matrix_model.hpp>
 #include <esokit/model/measured_input.hpp>
 #include <esokit/model/model_parts.hpp>
+#include <esokit/model/parts_shape.hpp>
 #include <esokit/model/plant_model.hpp>
+#include <esokit/model/plant_shape.hpp>
 #include <esokit/model/sampled_model.hpp>
 #include <esokit/model/scaled_chain.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
