@@ -50,7 +50,8 @@ struct GuardedConfig {
 ///   outdated dhat decays. This removes the integral action: a constant load leaves a steady error,
 ///   in the estimate `leak_error()`, in y `Adrc::leak_error()`.
 /// - A changing b0: `set_input_gain(b)` before a sample, without design work. Adrc and
-///   DisturbanceCompensator use the new b0, too.
+///   DisturbanceCompensator use the new b0, too. A retune keeps trust, pin and the ratio of this b0
+///   to that of the config.
 ///
 /// With a model (ModelEso) all guards act on the constant part of d only, not on the contributions
 /// of plant poles, actuator and sines to `total_disturbance`. The unit of d and its bound is that
@@ -258,10 +259,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     }
     gain_ratio_ = ratio;
     input_factor_ = factor;
-    if (on_chain) {
-      set_limit();
-      keep_bound();
-    }
+    if (on_chain) renew_bound();
     return {};
   }
 
@@ -343,8 +341,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     if (weights_.release_left > set_.release_samples) weights_.release_left = set_.release_samples;
     if (weights_.settling_left > 0) weights_.settling_left = set_.settling_samples;
     set_weights();
-    set_limit();
-    keep_bound();
+    renew_bound();
   }
 
   static Check<S> check(const Config& config) {
@@ -384,8 +381,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
       if (detail::GuardAccess::finite(observer_, next)) {
         detail::GuardAccess::states(observer_) = next;
       }
-      set_limit();
-      keep_bound();
+      renew_bound();
     }
     told_ratio_ = gain_ratio_;
   }
@@ -432,7 +428,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   }
 
   using Found = typename Guards::Found;
-  [[nodiscard]] ESOKIT_INLINE Found found() const noexcept {
+  ESOKIT_INLINE Found found() const noexcept {
     return on_chain || weights_.acts ? set_.guarded.found(observer_) : Found{};
   }
 
@@ -461,6 +457,10 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
 
   void set_weights() noexcept { weights_.weigh(observer_.input_gain() > S(0), set_.leak > S(0)); }
 
+  void renew_bound() noexcept {
+    set_limit();
+    keep_bound();
+  }
   void set_limit() noexcept {
     const bool by_input = set_.unit == DisturbanceUnit::input;
     const S present = by_input ? detail::absolute(S(configured_gain() * gain_ratio_)) : S(1);

@@ -140,9 +140,6 @@ class ControlLoop {
   using S = typename Observer::scalar_type;  ///< type of signals and settings
   using scalar_type = S;                     ///< the same type
   using Status = StatusOf<S>;                ///< StepStatus, for a pack one per lane
-  template <class T>
-  using with_scalar =
-      ControlLoop<detail::WithScalar<Observer, T>>;  ///< the same with another scalar
 
   /// Checks the settings.
   /// @param observer as returned by its `make`
@@ -301,8 +298,6 @@ class ControlLoop {
   [[nodiscard]] const Limiter<S>& limiter() const noexcept { return limiter_; }
 
  private:
-  template <LoopObserver Other>
-  friend class ControlLoop;
   friend struct detail::LaneAccess;
   friend struct detail::RecordAccess;
   static constexpr bool has_step_time = observer_traits<Observer>.varies_time;

@@ -28,8 +28,6 @@ template <int Order, Scalar S = double>
 class Softening {
  public:
   using scalar_type = S;  ///< type of signals and settings
-  template <class T>
-  using with_scalar = Softening<Order, T>;  ///< the same with another scalar
 
   /// Checks the settings.
   /// @param wanted left out: on for n >= 3, if both limits of u are given and k_0 > 0
