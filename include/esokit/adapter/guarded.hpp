@@ -170,10 +170,8 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
 
   /// Time update only, see PredictorCorrector::predict.
   StepStatus predict(S u_applied) noexcept {
-    if constexpr (gates) {
-      if (weights_.held) [[unlikely]]
-        return predict_standing(u_applied);
-    }
+    if (gates && weights_.held) [[unlikely]]
+      return predict_standing(u_applied);
     const StepStatus status = observer_.predict(S(u_applied * told_ratio_));
     if (takes_measured) keep_bound();
     take_gain();
@@ -182,10 +180,8 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
 
   /// Measurement update only, see PredictorCorrector::correct.
   StepStatus correct(S y) noexcept {
-    if constexpr (gates) {
-      if (weights_.held || weights_.unsettled) [[unlikely]]
-        return correct_standing(y);
-    }
+    if (gates && (weights_.held || weights_.unsettled)) [[unlikely]]
+      return correct_standing(y);
     const Found before = found();
     const StepStatus status = observer_.correct(y);
     keep_guards(before, status);
@@ -401,7 +397,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   }
 
   /// Prediction while held: d and the actuator continue, and the sensor follows a constant y.
-  ESOKIT_COLD StepStatus predict_standing(S u_applied) noexcept requires gates {
+  ESOKIT_COLD StepStatus predict_standing(S u_applied) noexcept {
     const auto before = detail::GuardAccess::states(observer_);
     const StepStatus status = observer_.predict(S(u_applied * told_ratio_));
     if (!has(status, StepStatus::prediction_dropped)) {
@@ -414,7 +410,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   }
 
   /// Correction while held: y is what is measured, and dhat stays.
-  ESOKIT_COLD StepStatus correct_standing(S y) noexcept requires gates {
+  ESOKIT_COLD StepStatus correct_standing(S y) noexcept {
     const auto before = detail::GuardAccess::states(observer_);
     const S left = S(1) - detail::GuardAccess::measured_gain(observer_);
     const StepStatus status = observer_.correct(y);
@@ -435,17 +431,15 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   /// Applies the guards after a correction. @param before dhat of the levels before it, which no
   /// prediction changes (m = 1)
   ESOKIT_INLINE void keep_guards(const Found& before, StepStatus status) noexcept {
-    if constexpr (gates) {
-      if (weights_.acts) [[unlikely]] {
-        if (weights_.freezes(set_.settling_samples)) set_weights();
-        // After a restart the old dhat is meaningless.
-        if (weights_.gated && !has(status, StepStatus::restarted)) {
-          set_.guarded.gate(observer_, before, weights_.up, weights_.down);
-        }
-        if (!weights_.refused(status)) {
-          set_.guarded.leak(observer_, set_.leak);
-          if (weights_.counts_down()) set_weights();
-        }
+    if (gates && weights_.acts) [[unlikely]] {
+      if (weights_.freezes(set_.settling_samples)) set_weights();
+      // After a restart the old dhat is meaningless.
+      if (weights_.gated && !has(status, StepStatus::restarted)) {
+        set_.guarded.gate(observer_, before, weights_.up, weights_.down);
+      }
+      if (!weights_.refused(status)) {
+        set_.guarded.leak(observer_, set_.leak);
+        if (weights_.counts_down()) set_weights();
       }
     }
     // With a model a refused measurement changes nothing, not even by rounding.

@@ -117,6 +117,16 @@ requires detail::WritesText<Stream> Stream& operator<<(Stream& out, Value mode) 
 
 namespace detail {
 
+/// A difference of angles by the shorter way; any other number as it is.
+template <class Observer, Scalar S>
+ESOKIT_INLINE S wrapped(const Observer& observer, const S& difference) noexcept {
+  if constexpr (observer_traits<Observer>.wraps_output) {
+    return observer.wrap(difference);
+  } else {
+    return difference;
+  }
+}
+
 /// Converts a u computed with b0 of the observer's config to the present b0.
 template <class Observer, Scalar S>
 ESOKIT_INLINE S by_present_gain(const Observer& observer, const S& u) noexcept {
