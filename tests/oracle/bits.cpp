@@ -22,6 +22,7 @@
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/half_gain_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
+#include <esokit/observer/mimo_extended_state_filter.hpp>
 #include <esokit/observer/model_eso.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
 #include <esokit/observer/reduced_order_eso.hpp>
@@ -40,6 +41,7 @@
 #include <esokit_before/observer/extended_state_filter.hpp>
 #include <esokit_before/observer/half_gain_eso.hpp>
 #include <esokit_before/observer/linear_eso.hpp>
+#include <esokit_before/observer/mimo_extended_state_filter.hpp>
 #include <esokit_before/observer/model_eso.hpp>
 #include <esokit_before/observer/nonlinear_eso.hpp>
 #include <esokit_before/observer/reduced_order_eso.hpp>
@@ -220,6 +222,44 @@ void compare(const Fill& fill) {
     tell(of_now, now);
     tell(of_before, before);
     ASSERT_EQ(of_now, of_before) << "sample " << k << ", call " << draw.call;
+  }
+}
+
+/// The same of a filter of several outputs.
+template <class Now, class Before, class Fill>
+void compare_mimo(const Fill& fill) {
+  typename Now::Config now_config{};
+  typename Before::Config before_config{};
+  fill(now_config);
+  fill(before_config);
+  auto now = Now::make(now_config).value();
+  auto before = Before::make(before_config).value();
+  Random random(seed);
+  long gap = 0;
+  for (long k = 0; k < samples; ++k) {
+    const double faults = k % 400 < 200 ? 1e-9 : 0.1;
+    const auto kind = static_cast<int>(random.uniform(0, faults < 0.01 ? 1 : 100));
+    const int missing = random.uniform(0, 2) < 1 ? 0 : 1;
+    if (k % 200 == 150) gap = static_cast<long>(random.uniform(0, 30));
+    double numbers[4];
+    for (double& x : numbers) x = drawn<double>(random, faults);
+    if (gap-- > 0) numbers[missing] = std::numeric_limits<double>::quiet_NaN();
+    const auto play = [&](auto& filter) {
+      using Filter = std::remove_cvref_t<decltype(filter)>;
+      typename Filter::Output y;
+      typename Filter::Input u;
+      for (int i = 0; i < 2; ++i) y(i) = numbers[i];
+      for (int i = 0; i < 2; ++i) u(i) = numbers[i + 2];
+      Bits bits;
+      if (kind == 1) bits.add(filter.reset(y));
+      if (kind == 2) bits.add(filter.correct(y));
+      if (kind == 3) bits.add(filter.predict(u));
+      bits.add(filter.update(y, u), filter.estimate(), filter.innovation(), filter.covariance(),
+               filter.gain(), filter.missed(0), filter.missed(1), filter.frozen(),
+               filter.innovation_covariance(), filter.normalised_innovation());
+      return bits;
+    };
+    ASSERT_EQ(play(now), play(before)) << "sample " << k;
   }
 }
 
@@ -421,6 +461,32 @@ const auto predictive = [](auto& c, double factor) {
   controller(c, factor);
 };
 ESOKIT_COMPARE(predictive_adrc, predictive, PredictiveAdrc<LinearEso<2>>)
+
+const auto several = [](auto& c) {
+  c.input_matrix(0, 0) = 2;
+  c.input_matrix(0, 1) = c.input_matrix(1, 1) = 1;
+  c.sample_time = 0.01;
+  c.measurement_covariance(0, 0) = 1e-4;
+  c.measurement_covariance(1, 1) = 2e-4;
+  c.measurement_covariance(0, 1) = c.measurement_covariance(1, 0) = 0.5e-4;
+  c.disturbance_bounds = {0, 0, 1, 0, 1};
+  c.inflation = 0.01;
+  c.max_gap = 20;
+};
+const auto several_frozen = [](auto& c) {
+  several(c);
+  c.mode = decltype(c.mode)::frozen;
+};
+TEST(Bits, several_outputs) {
+  compare_mimo<esokit::MimoExtendedStateFilter<esokit::ChainOrders<2, 1>, 2>,
+               esokit_before::MimoExtendedStateFilter<esokit_before::ChainOrders<2, 1>, 2>>(
+      several);
+}
+TEST(Bits, several_outputs_frozen) {
+  compare_mimo<esokit::MimoExtendedStateFilter<esokit::ChainOrders<2, 1>, 2>,
+               esokit_before::MimoExtendedStateFilter<esokit_before::ChainOrders<2, 1>, 2>>(
+      several_frozen);
+}
 
 }  // namespace oracle_bits
 }  // namespace esokit_test
