@@ -87,6 +87,8 @@
 #include <esokit/gain/gap_certificate.hpp>
 #include <esokit/gain/gating_certificate.hpp>
 #include <esokit/gain/half_gain.hpp>
+#include <esokit/gain/mimo_filter_config.hpp>
+#include <esokit/gain/mimo_riccati.hpp>
 #include <esokit/gain/model_gain.hpp>
 #include <esokit/gain/model_placement.hpp>
 #include <esokit/gain/noise_settings.hpp>
