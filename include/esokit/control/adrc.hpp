@@ -375,8 +375,7 @@ class Adrc {
       if constexpr (error_based) {
         return detail::by_present_gain(observer(), S(weights_[0] * x + rest));
       } else {
-        S error = reference - x;
-        if constexpr (wraps) error = observer().wrap(error);
+        const S error = detail::wrapped(observer(), S(reference - x));
         return detail::by_present_gain(observer(), S(weights_[0] * error - rest));
       }
     } else {
@@ -403,7 +402,7 @@ class Adrc {
     for (int i = 0; i <= order; ++i) {
       e(i) = error_based ? S(estimate(i)) : S(reference(i) - estimate(i));
     }
-    if constexpr (wraps && !error_based) e(0) = observer().wrap(e(0));
+    if (!error_based) e(0) = detail::wrapped(observer(), S(e(0)));
     return e;
   }
 
