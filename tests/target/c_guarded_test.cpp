@@ -79,13 +79,6 @@ TEST(CGuarded, FrozenAfterAHold) {
   equals_changed<Adrc<Settling>>(30000, 931, "gcc -std=c99", pair);
 }
 
-/// As of others, see c_code_test.cpp.
-template <class C>
-void compiles() {
-  SCOPED_TRACE(testing::internal::GetTypeName<C>());
-  compiles_elsewhere(to_c(C::make(config<C>(8)).value(), {.name = "loop"}).value(), "loop");
-}
-
 TEST(CGuarded, CompilesWithOtherCompilers) {
   compiles<Adrc<Late<LinearEso<2, float>>>>();
   compiles<Adrc<Guarded<DelayedInput<WrappedOutput<CascadeEso<2, 2, float>>, 3>>>>();

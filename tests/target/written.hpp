@@ -557,6 +557,128 @@ void observes(int samples, std::uint64_t seed) {
   }
 }
 
+/// The config of the observer in a controller's, inside its adapters.
+template <class Config>
+auto& innermost(Config& config) {
+  if constexpr (requires { config.observer; }) {
+    return innermost(config.observer);
+  } else {
+    return config;
+  }
+}
+
+/// The C of a controller, elsewhere, see above. @param change of the settings
+template <class C, class Change>
+void compiles_changed(const Change& change) {
+  SCOPED_TRACE(testing::internal::GetTypeName<C>());
+  auto settings = config<C>(8);
+  change(settings);
+  compiles_elsewhere(to_c(C::make(settings).value(), {.name = "loop"}).value(), "loop");
+}
+template <class C>
+void compiles() {
+  compiles_changed<C>([](auto&) {});
+}
+
+/// Bad numbers are refused whatever the compiler assumes of them.
+template <class C>
+void refuses_under_fast_math() {
+  SCOPED_TRACE(testing::internal::GetTypeName<C>());
+  using V = typename C::scalar_type;
+  const Folder folder;
+  InC<V> in_c(folder, to_c(C::make(config<C>(8)).value(), {.name = "loop"}).value(), true,
+              "gcc -std=gnu99 -ffast-math -Wno-error");
+  ASSERT_TRUE(in_c.loaded());
+  for (const V bad : {hidden_nan<V>(), hidden_infinity<V>(), -hidden_infinity<V>()}) {
+    for (int k = 0; k < 20; ++k) EXPECT_TRUE(is_finite(in_c.update(V(0.1), V(0.2))));
+    EXPECT_TRUE(is_finite(in_c.update(bad, V(0.2))));
+    EXPECT_EQ(in_c.probe() % 2, 1u) << "measurement_rejected";
+    EXPECT_TRUE(is_finite(in_c.update(V(0.1), bad)));
+    in_c.applied(bad);
+    EXPECT_TRUE(is_finite(in_c.update(V(0.1), V(0.2))));
+    EXPECT_NE(in_c.start(bad, V(0)), 0u);
+    EXPECT_NE(in_c.start(V(0), bad), 0u);
+    for (unsigned row = 0; row < 2; ++row) EXPECT_TRUE(is_finite(in_c.estimate(row)));
+  }
+}
+
+/// Other settings while it runs, as by `adopt`.
+template <class C>
+void adopts(std::uint64_t seed) {
+  SCOPED_TRACE(testing::internal::GetTypeName<C>());
+  using V = typename C::scalar_type;
+  auto settings = config<C>(8);
+  const C first = C::make(settings).value();
+  innermost(settings).observer_bandwidth = V(20);
+  if constexpr (requires { settings.controller_bandwidth; }) settings.controller_bandwidth = V(3);
+  settings.limits = {V(-1), V(1.5), V(60)};
+  const C second = C::make(settings).value();
+  settings.missing.most = 3;  // not one of the settings
+  const C third = C::make(settings).value();
+  CodeOptions options{.name = "loop", .comment = "a test", .settings_in_struct = true};
+  CCode code = to_c(first, options).value();
+  options.comment = "another";
+  options.settings_name = "slow";
+  const auto slow = to_c(second, options).value();
+  options.settings_name = "other";
+  const auto other = to_c(third, options).value();
+  const Folder folder;
+  const Library library(folder, code,
+                        slow.settings + other.settings +
+                            "unsigned loop_size(void);\n"
+                            "unsigned loop_size(void) { return sizeof(loop_state); }\n");
+  ASSERT_TRUE(library.loaded());
+  void (*init)(void*) = nullptr;
+  V (*update)(void*, V, V) = nullptr;
+  V (*estimate)(const void*, unsigned) = nullptr;
+  bool (*adopt)(void*, const void*) = nullptr;
+  int (*self_test)(V) = nullptr;
+  unsigned (*size)() = nullptr;
+  const void* sets[3] = {};
+  library.find(init, "loop_init");
+  library.find(update, "loop_update");
+  library.find(estimate, "loop_estimate");
+  library.find(adopt, "loop_adopt");
+  library.find(self_test, "loop_self_test");
+  library.find(size, "loop_size");
+  library.find(sets[0], "loop_design");
+  library.find(sets[1], "loop_slow");
+  library.find(sets[2], "loop_other");
+  EXPECT_EQ(self_test(V(0)), 0);
+  std::vector<std::uint64_t> state(size() / sizeof(std::uint64_t) + 1);
+  init(state.data());
+  C mine = first;
+  ChainPlant plant(C::order, 0.0078125, 8, 1.5);
+  Random random(seed);
+  V r(1);
+  int limited = 0;
+  for (int k = 0; k < 30000 && !testing::Test::HasFailure(); ++k) {
+    plant.step(static_cast<double>(mine.output()));
+    if (random.index(60) == 0) r = static_cast<V>(random.uniform(-4, 4));
+    V y = static_cast<V>(plant.output() + 1e-3 * random.uniform(-1, 1));
+    if (random.index(20) == 0) y = random.index(2) == 0 ? hidden_nan<V>() : anything<V>(random);
+    const int set = random.index(300);
+    if (set < 2) {
+      EXPECT_TRUE(mine.adopt(set == 0 ? first : second));
+      EXPECT_TRUE(adopt(state.data(), sets[set]));
+    }
+    if (set == 2) {
+      EXPECT_FALSE(adopt(state.data(), sets[2]));
+    }
+    V given = r;
+    if constexpr (!requires { mine.gains(); }) given = (r - y) / V(8);
+    const V u = mine.update(y, given);
+    EXPECT_TRUE(equal_bits(u, update(state.data(), y, given))) << "sample " << k;
+    detail::unroll<std::remove_cvref_t<decltype(mine.observer())>::size>([&](auto row) {
+      EXPECT_TRUE(equal_bits(V(mine.observer().template estimate<row>()),
+                             estimate(state.data(), unsigned{row})))
+          << "sample " << k << ", estimate " << row;
+    });
+    limited += !equal_bits(mine.output(), mine.requested());
+  }
+  EXPECT_GT(limited, 3000);
+}
+
 #endif  // ESOKIT_LOADS_C
 
 }  // namespace written

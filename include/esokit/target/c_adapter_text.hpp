@@ -169,6 +169,30 @@ static unsigned update_gated($name_state *o, $real y, $real u)
 
 )";
 
+/// KnownModel around it.
+inline constexpr const char* c_source_known =
+    R"(/* The known part of the motion acts like a u of its own. */
+static $real push_known($name_state *o, $real u)
+{
+  $real driven = $ZERO;
+  (void)drive(o, u, &driven);
+  return driven;
+}
+
+static unsigned predict_known($name_state *o, $real u)
+{
+  const unsigned status = predict_$below(o, push_known(o, u));
+  return is_finite(u) ? status : (status | $NAME_INPUT_REJECTED);
+}
+
+static unsigned update_known($name_state *o, $real y, $real u)
+{
+  const unsigned status = update_$below(o, y, push_known(o, u));
+  return is_finite(u) ? status : (status | $NAME_INPUT_REJECTED);
+}
+
+)";
+
 /// DelayedInput around it.
 inline constexpr const char* c_source_delay = R"(static uint16_t after_delayed(uint16_t place)
 {

@@ -71,6 +71,27 @@ inline Words c_common_words(const ListWriter& writer, const CodeOptions& options
           {"$COMMENT", options.comment.empty() ? "" : " * " + options.comment + "\n"}};
 }
 
+/// What is known is computed by functions of the C library, whose last bits are its own.
+inline std::string c_library_calls(const RecordedDesign& design) {
+  std::string names;
+  for (int at = 0; design.known.on && at < static_cast<int>(c_language.of.size()); ++at) {
+    const auto is_it = [at](const Instruction& one) {
+      return static_cast<int>(one.operation) == at;
+    };
+    const bool used = static_cast<int>(Operation::power) <= at &&
+                      at <= static_cast<int>(Operation::hyperbolic_tangent) &&
+                      std::any_of(design.calls.begin(), design.calls.end(), [&](const auto& call) {
+                        const auto& list = call.list.instructions;
+                        return std::any_of(list.begin(), list.end(), is_it);
+                      });
+    if (!used) continue;
+    const std::string call = c_language.of[static_cast<std::size_t>(at)];
+    names += (names.empty() ? ",\n * where the C library has the same " : ", ") +
+             call.substr(0, call.find('$')) + (design.single ? "f" : "");
+  }
+  return names;
+}
+
 /// What the texts need of any design.
 inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
   const std::string real = writer.real();
@@ -279,6 +300,7 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
       {"$BOOL", opens || guard.on ? "$include <stdbool.h>\n" : ""},
       {"$include", "#include"},  // not written in the texts: scripts look for such lines
       {"$MEMBERS", members},
+      {"$LIBRARY", c_library_calls(design)},
       {"$TIME", writer.number(design.sample_time)},
       {"$CORRECT", corrects},
       {"$KEEP_BOUND", bounds},
@@ -409,19 +431,16 @@ inline Words c_loop_words(const RecordedDesign& design, const ListWriter& writer
     return "  if (" + condition + ") {\n    " + then + ";\n  }\n";
   };
   const std::string& angle = design.wrap.angle;
-  std::string call_law =
-      "    (void)law(o, " + (angle.empty() ? "r" : "wrapped(r - o->" + angle + ")") + ", &u);\n";
-  if (design.law.kind == RunningLaw::schedule) {
-    std::string estimates;
-    for (int row = 0; row < design.size; ++row) {
-      estimates += ", $name_estimate(o, " + std::to_string(row) + "u)";
-    }
-    const bool wraps = design.wrap.period > 0 && !design.error_based && !design.compensates;
-    const std::string first = "$name_estimate(o, 0u)";
-    call_law = "    (void)law(o, " +
-               (wraps ? first + " + wrapped(r - " + first + ")" : std::string("r")) + estimates +
-               ", &u);\n";
+  const bool wraps = design.wrap.period > 0 && !design.error_based && !design.compensates;
+  const std::string reference = !angle.empty() ? "wrapped(r - o->" + angle + ")"
+                                : wraps
+                                    ? "$name_estimate(o, 0u) + wrapped(r - $name_estimate(o, 0u))"
+                                    : "r";
+  std::string estimates;
+  for (int row = 0; design.law.kind == RunningLaw::schedule && row < design.size; ++row) {
+    estimates += ", $name_estimate(o, " + std::to_string(row) + "u)";
   }
+  std::string call_law = "    (void)law(o, " + reference + estimates + ", &u);\n";
   const bool guards = design.guard.on;
   if (guards && design.compensates) {
     call_law = "    (void)law(o, -$ZERO, &u);\n    u = r + (u * o->input_factor);\n";
@@ -459,7 +478,9 @@ inline Words c_loop_words(const RecordedDesign& design, const ListWriter& writer
       {"$REST", design.gate.threshold > 0
                     ? "if ($rest(o, $MEASURED, $U_APPLIED)) {\n      gate_set(o, true);\n    }"
                     : "(void)$rest(o, $MEASURED, $U_APPLIED);"},
-      {"$U_APPLIED", guards ? "applied_by_present(o)" : "o->u_applied"},
+      {"$U_APPLIED", guards            ? "applied_by_present(o)"
+                     : design.known.on ? "o->u_given"
+                                       : "o->u_applied"},
       {"$ASKED", design.options.watched ? "  o->u_asked = o->u_last;\n" : ""},
       {"$CALL_LAW", call_law},
       {"$MEASURED", design.error_based ? "r - y" : "y"},
@@ -565,6 +586,10 @@ inline CCode c_texts(const RecordedDesign& design, const std::string& mark) {
     layers += wraps ? c_source_wrapped_rest : c_source_running_rest;
     rest = wraps ? "rest_wrapped" : "rest_running";
   }
+  if (design.known.on) {
+    add(c_source_known);
+    predict = update = "known";
+  }
   if (!design.line.empty()) {
     add(c_source_delay);
     if (controls) layers += c_source_delay_fill;
@@ -658,13 +683,19 @@ inline CCode c_code(const RecordedDesign& design) {
 ///
 /// Written are LinearEso, also with a set of poles, HalfGainEso, ReducedOrderEso, CascadeEso,
 /// AdjustableBandwidthEso, NonlinearEso, ModelEso, PlantEso and their cascades (not with
-/// `follows_speed`), AlgebraicEso, ExtendedStateFilter (in its modes recursive and frozen, without
-/// a nominal model), these in DelayedInput and OutlierGate or WrappedOutput, in Measured with one
-/// disturbance (around no WrappedOutput, but inside it, and not in Guarded), LinearEso and
-/// CascadeEso in Guarded, too (a changing b0 unless the law softens), and Adrc of
-/// both forms and DisturbanceCompensator around them, and PredictiveAdrc around one of a single
-/// level with constant gains and no sensor in its model, without an adapter. Others do not compile.
-/// SmoothProfile and HealthMonitor: target/profile_code.hpp and target/health_code.hpp.
+/// `follows_speed`), these in KnownModel if its function is generic, AlgebraicEso,
+/// ExtendedStateFilter (in its modes recursive and frozen, without a nominal model), these in
+/// DelayedInput and OutlierGate or WrappedOutput, in Measured with one disturbance (around no
+/// WrappedOutput, but inside it, and not in Guarded), LinearEso and CascadeEso in Guarded, too (a
+/// changing b0 unless the law softens), and Adrc of both forms and DisturbanceCompensator around
+/// them, and PredictiveAdrc around one of a single level with constant gains and no sensor in its
+/// model, without an adapter. Others do not compile. The function of a KnownModel is recorded like
+/// all else, with its own numbers as constants: it is `template <class E> auto operator()(const E&
+/// x) const noexcept`, or a template of the scalar with `with_scalar`. It adds, multiplies and
+/// compares numbers of the observer's scalar (and integers), and calls abs, sqrt, pow, exp, expm1,
+/// sin, cos, tan, atan and tanh as by `using std::sin;`. A branch on a value does not compile:
+/// `select(condition, a, b)` chooses. SmoothProfile and HealthMonitor: target/profile_code.hpp and
+/// target/health_code.hpp.
 /// @param object as `make` returned it: its state is that of `init`
 /// @return error for a name that is no identifier, a comment that would end the one it stands in, a
 ///         number of samples of the self-test out of range, or a gain law of your own whose gain
@@ -680,11 +711,15 @@ Expected<CCode, Error<typename Object::scalar_type>> to_c(const Object& object,
 /// What cannot be written yet, by name.
 template <class Other>
 void to_c(const Other&, const CodeOptions& = {}) {
+  static_assert(detail::knows_in_general<Other>,
+                "esokit: to_c records the function of a KnownModel: it has to be generic, template "
+                "<class E> auto operator()(const E& x) const noexcept");
   static_assert(
-      detail::Writable<Other>,
+      !detail::knows_in_general<Other> || detail::Writable<Other>,
       "esokit: to_c writes LinearEso, HalfGainEso, ReducedOrderEso, CascadeEso, "
       "AdjustableBandwidthEso, NonlinearEso, ModelEso, PlantEso, AlgebraicEso and "
-      "ExtendedStateFilter, these in DelayedInput and OutlierGate or WrappedOutput, in Measured "
+      "ExtendedStateFilter, these in KnownModel (not AlgebraicEso), DelayedInput and OutlierGate "
+      "or WrappedOutput, in Measured "
       "with one disturbance, on the chain with one extended state in Guarded, and "
       "Adrc and DisturbanceCompensator around them, and PredictiveAdrc around one with constant "
       "gains; no other gains, adapters or controllers yet");

@@ -14,7 +14,7 @@ inline constexpr const char* c_header_head = R"(#ifndef $NAME_H
 /* Written by esokit from a finished design; do not edit.
 $COMMENT * T = $TIME s, b0 = $GAIN$LIMITS.
  *
- * Compile with -std=c99 or -ffp-contract=off: then it equals the C++ bit for bit. */
+ * Compile with -std=c99 or -ffp-contract=off: then it equals the C++ bit for bit$LIBRARY. */
 
 $BOOL$include <stdint.h>
 

@@ -443,6 +443,9 @@ class FixedDesign {
       return refuse("observer", design_->measured.gain,
                     "is in Measured, which is not written in fixed point");
     }
+    if (design_->known.on) {
+      return refuse("observer", 0, "is in KnownModel, which is not written in fixed point");
+    }
     if (design_->law.kind != RunningLaw::none && !design_->law.settled) {
       return refuse("observer", static_cast<double>(design_->law.age),
                     "has gains that go on: let it settle first (AlgebraicEso), freeze the filter "
