@@ -36,14 +36,12 @@ static_assert(Writable<LinearEso<2>> && Writable<CascadeEso<2, 3>> &&
               Writable<DelayedInput<OutlierGate<LinearEso<2>>, 4>> &&
               Writable<Adrc<LinearEso<2>, ErrorBased>>);
 static_assert(Writable<AlgebraicEso<2>> && Writable<ExtendedStateFilter<2>> &&
-              Writable<DelayedInput<WrappedOutput<LinearEso<2>>, 4>>);
+              Writable<DelayedInput<WrappedOutput<OutlierGate<LinearEso<2>>>, 4>>);
 struct NominalSpring {
   double operator()(const Vector<double, 2>& x, double, double) const { return -x(0); }
 };
 static_assert(!Writable<ExtendedStateFilter<2, double, 1, NominalSpring>> &&
               !Writable<ExtendedStateFilter<2, double, 1, NoNominalModel, 10>> &&
-              !Writable<WrappedOutput<OutlierGate<LinearEso<2>>>> &&
-              !Writable<DelayedInput<WrappedOutput<OutlierGate<LinearEso<2>>>, 4>> &&
               !Writable<ModelEso<follows>> && !Writable<Guarded<LinearEso<2, double, 2>>> &&
               !Writable<Guarded<ModelEso<lag>>> && !Writable<VariableTime<LinearEso<2>>> &&
               !Writable<PredictiveAdrc<AlgebraicEso<2>>> &&

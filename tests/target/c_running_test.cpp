@@ -71,6 +71,24 @@ TEST(CRunning, OfAnglesByTurns) {
   equals_controller<DisturbanceCompensator<WrappedOutput<LinearEso<1, double>>>>(30000, 581);
 }
 
+/// A gate inside: turns are counted twice.
+TEST(CRunning, OfAnglesByTurnsAroundAGate) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  equals<WrappedOutput<OutlierGate<LinearEso<2, double>>>>(30000, 751);
+  equals<DelayedInput<WrappedOutput<OutlierGate<LinearEso<2, float>>>, 3>>(30000, 761);
+  observes<WrappedOutput<OutlierGate<CascadeEso<1, 2, double>>>>(30000, 771);
+  equals<WrappedOutput<OutlierGate<ModelEso<lag, float>>>>(30000, 781);
+  equals<Guarded<WrappedOutput<OutlierGate<LinearEso<2, double>>>>>(30000, 791);
+  equals<WrappedOutput<ExtendedStateFilter<2, double>>>(30000, 1301);  // it has a gate of its own
+  equals_changed<Adrc<WrappedOutput<ExtendedStateFilter<2, double>>>>(
+      30000, 1311, "gcc -std=c99",
+      [](auto& settings) { innermost(settings).outlier_threshold = 25; });
+  equals_changed<DisturbanceCompensator<WrappedOutput<OutlierGate<LinearEso<1, float>>>>>(
+      30000, 1321, "gcc -std=c99", [](auto& settings) {
+        settings.observer.observer.threshold = settings.observer.observer.running_factor = 0;
+      });
+}
+
 TEST(CRunning, OfGuards) {
   if (!there("gcc")) GTEST_SKIP() << "no gcc";
   equals<Guarded<LinearEso<2, double>>>(30000, 601);
@@ -88,6 +106,7 @@ TEST(CRunning, OfGuards) {
 TEST(CRunning, CompilesWithOtherCompilers) {
   compiles<Adrc<AlgebraicEso<2, float>>>();
   compiles<Adrc<ExtendedStateFilter<1, float>>>();
+  compiles<Adrc<WrappedOutput<OutlierGate<LinearEso<2, float>>>>>();
   compiles<Adrc<Guarded<DelayedInput<WrappedOutput<LinearEso<2, float>>, 3>>>>();
 }
 

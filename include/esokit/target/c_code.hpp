@@ -130,18 +130,35 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
             "u;\n  o->gate_open = " + (gate.open ? "1u" : "0u") + ";\n";
   }
   const WrapNumbers& wrap = design.wrap;
+  const std::string of_turns =
+      "  " + real + " angle; /* the last y, within half a period of zero */\n  " + real +
+      " turns;\n  " + real + " motion; /* of y in motion_samples */\n" +
+      "  uint16_t motion_samples;\n  uint8_t gaps;\n  uint8_t doubts;\n  uint8_t begun;\n";
   if (wrap.period > 0) {
-    members += "  " + real + " angle; /* the last y, within half a period of zero */\n  " + real +
-               " turns;\n  " + real + " motion; /* of y in motion_samples */\n" +
-               "  uint16_t motion_samples;\n  uint8_t gaps;\n  uint8_t doubts;\n" +
-               "  uint8_t begun;\n";
-    init += "  o->angle = " + writer.number(wrap.y) +
-            ";\n  o->turns = " + writer.number(wrap.turns) +
-            ";\n  o->motion = " + writer.number(wrap.motion) +
-            ";\n  o->motion_samples = " + std::to_string(wrap.samples) +
-            "u;\n  o->gaps = " + std::to_string(wrap.gaps) +
-            "u;\n  o->doubts = " + std::to_string(wrap.doubts) +
-            "u;\n  o->begun = " + (wrap.begun ? "1u" : "0u") + ";\n";
+    const auto set = [&](const std::string& place, const TurnNumbers& count) {
+      init += place + "angle = " + writer.number(count.y) + ";\n" + place +
+              "turns = " + writer.number(count.turns) + ";\n" + place +
+              "motion = " + writer.number(count.motion) + ";\n" + place +
+              "motion_samples = " + std::to_string(count.samples) + "u;\n" + place +
+              "gaps = " + std::to_string(count.gaps) + "u;\n" + place +
+              "doubts = " + std::to_string(count.doubts) + "u;\n" + place +
+              "begun = " + (count.begun ? "1u" : "0u") + ";\n";
+    };
+    if (wrap.gated) {
+      members +=
+          "  $name_turns taken; /* by the gate */\n  $name_turns heard; /* rejected, too */\n" +
+          std::string(
+              "  uint16_t heard_at; /* samples since one was taken, at the last one */\n"
+              "  uint8_t heard_steady;\n  uint8_t heard_rejected;\n");
+      set("  o->taken.", wrap.count);
+      set("  o->heard.", wrap.heard);
+      init += "  o->heard_at = " + std::to_string(wrap.heard_at) +
+              "u;\n  o->heard_steady = " + std::to_string(wrap.heard_steady) +
+              "u;\n  o->heard_rejected = " + std::to_string(wrap.heard_rejected) + "u;\n";
+    } else {
+      members += of_turns;
+      set("  o->", wrap.count);
+    }
   }
   const MeasuredNumbers& measured = design.measured;
   const auto pair = [&](const std::array<double, 2>& two) {
@@ -386,6 +403,28 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
       {"$STATES", std::to_string(design.size)},
       {"$STARTu", std::to_string(law.start) + "u"},
       {"$LEASTu", std::to_string(law.least_age) + "u"},
+      {"$TURNS", wrap.gated ? "/* The count of the turns of an angle. */\ntypedef struct {\n" +
+                                  of_turns + "} $name_turns;\n\n"
+                            : ""},
+      {"$count_state", wrap.gated ? "$name_turns" : "$name_state"},
+      {"$forget", wrap.gated ? "forget_count" : "forget_turns"},
+      {"$choose_angle", wrap.gated ? "choose_angle" : "read_angle"},
+      {"$READING_MORE",
+       wrap.gated
+           ? "  uint32_t missed; /* samples since one was taken */\n  bool heard; /* its turn is "
+             "counted from rejected ones, too */\n"
+           : ""},
+      {"$NONE_MORE", wrap.gated ? ", 0u, false" : ""},
+      {"$FORGET_BOTH",
+       wrap.gated ? "static void forget_turns($name_state *o)\n{\n  forget_count(&o->taken);\n  "
+                    "forget_count(&o->heard);\n  o->heard_at = 0u;\n  o->heard_steady = 0u;\n  "
+                    "o->heard_rejected = 0u;\n}\n\n"
+                  : ""},
+      {"$OPEN_GATE", wrap.gated && gated ? "    gate_set(o, true);\n" : ""},
+      {"$TURN_BACK", wrap.gated
+                         ? "      o->taken.turns = o->taken.turns - turns;\n      o->heard.turns = "
+                           "o->heard.turns - turns;\n"
+                         : "      o->turns = o->turns - turns;\n"},
       {"$PERIOD", writer.number(wrap.period)},
       {"$INVERSE", writer.number(wrap.inverse_period)},
       {"$HALF", writer.number(wrap.period * 0.5)},
@@ -579,6 +618,8 @@ inline CCode c_texts(const RecordedDesign& design, const std::string& mark) {
   }
   if (wraps) {
     add(c_source_wrapped);
+    layers += design.wrap.gated ? c_source_wrapped_gated : c_source_wrapped_keep;
+    add(c_source_wrapped_layer);
     predict = correct = update = "wrapped";
     restart = "restart_wrapped";
   }

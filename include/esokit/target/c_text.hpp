@@ -70,7 +70,7 @@ inline constexpr const char* c_header_controller = R"(/* `mode`: what determines
 #define $NAME_START_HOLD 1u
 #define $NAME_SAFE 2u /* too many measurements are missing */
 
-typedef struct {
+$TURNStypedef struct {
 $MEMBERS$PHASE_MEMBER  uint32_t hold_left; /* samples of the start hold */
   uint16_t gap; /* samples since the last measurement that was taken */
   uint8_t mode;
@@ -258,7 +258,7 @@ unsigned $name_applied($name_state *o, $real u)
 )";
 
 /// The header of an observer.
-inline constexpr const char* c_header_observer = R"(typedef struct {
+inline constexpr const char* c_header_observer = R"($TURNStypedef struct {
 $MEMBERS  uint16_t gap; /* samples since the last measurement that was taken */
 } $name_state;
 

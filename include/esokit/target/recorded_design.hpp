@@ -87,11 +87,8 @@ struct LawNumbers {
   bool watches = false;    ///< whether it refuses outliers
 };
 
-/// A WrappedOutput.
-struct WrapNumbers {
-  double period = 0;  ///< 0: there is none
-  double inverse_period = 0;
-  double most_turns = 0;  ///< more cannot be told apart
+/// Its count of turns.
+struct TurnNumbers {
   double y = 0;
   double turns = 0;
   double motion = 0;
@@ -99,6 +96,19 @@ struct WrapNumbers {
   unsigned gaps = 0;
   unsigned doubts = 0;
   bool begun = false;
+};
+
+/// A WrappedOutput.
+struct WrapNumbers {
+  double period = 0;  ///< 0: there is none
+  double inverse_period = 0;
+  double most_turns = 0;  ///< more cannot be told apart
+  TurnNumbers count{};
+  bool gated = false;  ///< around a gate: the rest counts over all measurements
+  TurnNumbers heard{};
+  unsigned heard_at = 0;
+  unsigned heard_steady = 0;
+  unsigned heard_rejected = 0;
   std::string angle{};  ///< the estimate that the law subtracts from the reference
 };
 
@@ -537,13 +547,18 @@ struct RecordAccess {
     wrap.period = number(o.period_);
     wrap.inverse_period = number(o.inverse_period_);
     wrap.most_turns = number(S(1) / (S(8) * rounding<S>()));
-    wrap.y = number(o.count_.y);
-    wrap.turns = number(o.count_.turns);
-    wrap.motion = number(o.count_.motion);
-    wrap.samples = o.count_.samples;
-    wrap.gaps = o.count_.gaps;
-    wrap.doubts = o.count_.doubts;
-    wrap.begun = o.count_.begun;
+    const auto counted = [&](const auto& c) {
+      return TurnNumbers{number(c.y), number(c.turns), number(c.motion), c.samples,
+                         c.gaps,      c.doubts,        c.begun};
+    };
+    wrap.count = counted(o.count_);
+    if constexpr (O::gated) {
+      wrap.gated = true;
+      wrap.heard = counted(o.heard_.count);
+      wrap.heard_at = o.heard_.at;
+      wrap.heard_steady = o.heard_.steady;
+      wrap.heard_rejected = o.heard_.rejected;
+    }
     return wrap;
   }
 
@@ -780,18 +795,6 @@ inline constexpr bool measures_plainly = [] {
     return true;
   }
 }();
-/// With a gate in it a WrappedOutput counts twice.
-template <class Observer>
-inline constexpr bool wraps_beside_gate = [] {
-  if constexpr (IsWrapped<Observer>::value) {
-    return observer_traits<typename Observer::Adapted>.rejects_outliers;
-  } else if constexpr (is_adapter<Observer> || IsKnown<Observer>::value) {
-    return wraps_beside_gate<typename Observer::Adapted>;
-  } else {
-    return false;
-  }
-}();
-
 /// What the adapters around an observer count and choose.
 template <class Observer>
 void take_adapters(RecordedDesign& design, const Observer& observer) {
@@ -908,8 +911,7 @@ inline constexpr bool knows_in_general<DisturbanceCompensator<Observer>> =
 
 /// The same, perhaps in an adapter.
 template <class Observer>
-concept WritableObserver =
-    HasLists<typename WithoutAdapter<Observer>::type> && !wraps_beside_gate<Observer> &&
+concept WritableObserver = HasLists<typename WithoutAdapter<Observer>::type> &&
     measures_plainly<Observer> && RecordAccess::guards_a_chain<Observer>;
 
 template <class C>
@@ -1009,6 +1011,8 @@ class DesignRecorder {
   /// subject @param name_of gives the name of a number, or ""
   template <class Of, class NameOf>
   [[nodiscard]] Check<V> record(const Of& of, const NameOf& name_of) {
+    // Without one nothing is rejected.
+    design.wrap.gated = design.wrap.gated && (design.gate.threshold > 0 || design.law.watches);
     add_observer(of);
     const auto closed = recorder_.record();
     if (!closed) return closed.error();
