@@ -7,7 +7,7 @@
 // Each layer calls the one below. Words with a dollar are filled in.
 namespace esokit::detail {
 
-/// Measured around it.
+/// Measured around it: what each w passes. Of several all its names have a number.
 inline constexpr const char* c_source_measured = R"(/* A measured disturbance w. */
 static bool takes_w($real w)
 {
@@ -43,7 +43,10 @@ static $real course_of_w(const $name_state *o, $real *passed)
   return mean;
 }
 
-static $real effect_of_w(const $name_state *o)
+)";
+/// What all of them do.
+inline constexpr const char* c_source_measured_effect =
+    R"(static $real effect_of_w(const $name_state *o)
 {
   $real passed = $ZERO;
   const $real mean = course_of_w(o, &passed);
@@ -56,7 +59,24 @@ static unsigned predict_measured($name_state *o, $real u)
   $real passed = $ZERO;
   $real now;
   $real more;
-  (void)course_of_w(o, &passed);
+)";
+inline constexpr const char* c_source_measured_effects =
+    R"(static $real effect_of_w(const $name_state *o)
+{
+  $real passed = $ZERO;
+  $real all = $ZERO;
+$W_ADD_ALL  return all;
+}
+
+static unsigned predict_measured($name_state *o, $real u)
+{
+  const unsigned status = predict_$below(o, u);
+  $real now;
+  $real more;
+$W_ADVANCE_ALL  o->w_is_new = 0u;
+)";
+/// A sample of a w.
+inline constexpr const char* c_source_measured_sample = R"(  (void)course_of_w(o, &passed);
   o->w_lagged = passed;
   if ((o->w_is_new != 0u) && takes_w(o->w_given)) {
     o->w_last = o->w_given;
@@ -66,10 +86,17 @@ static unsigned predict_measured($name_state *o, $real u)
   } else {
     /* It has been lost for long. */
   }
-  o->w_is_new = 0u;
-  o->newest_w = after_w(o->newest_w);
+$W_FORGET  o->newest_w = after_w(o->newest_w);
   o->w[o->newest_w] = (o->w_lost > $W_MOSTu) ? $ZERO : o->w_last;
-  now = effect_of_w(o);
+)";
+inline constexpr const char* c_source_measured_advance =
+    R"(static void advance_w($name_state *o)
+{
+  $real passed = $ZERO;
+$W_SAMPLE}
+
+)";
+inline constexpr const char* c_source_measured_tell = R"(  now = effect_of_w(o);
   more = now - o->w_told;
   if (((more < $ZERO) || (more > $ZERO)) && load(o, more)) {
     o->w_told = now;
@@ -77,10 +104,9 @@ static unsigned predict_measured($name_state *o, $real u)
   return status;
 }
 
-void $name_measured($name_state *o, $real w)
+void $name_measured($name_state *o, $W_ARGUMENT)
 {
-  o->w_given = $W_SIGNw;
-  o->w_is_new = 1u;
+$W_GIVE  o->w_is_new = 1u;
 }
 
 )";
@@ -103,7 +129,13 @@ static void settle_w($name_state *o)
     o->w[i] = w;
   }
   o->w_lagged = w;
-  o->w_told = effect_of_w(o);
+$W_TOLD}
+
+)";
+/// Of all of them.
+inline constexpr const char* c_source_measured_settle_all = R"(static void settle_w($name_state *o)
+{
+$W_SETTLE_ALL  o->w_told = effect_of_w(o);
 }
 
 )";

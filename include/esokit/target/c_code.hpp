@@ -92,6 +92,82 @@ inline std::string c_library_calls(const RecordedDesign& design) {
   return names;
 }
 
+/// Names and numbers of one measured disturbance: where there are several, w is w1, w2, ..
+inline Words c_words_of_w(const MeasuredNumbers& measured, std::size_t at,
+                          const ListWriter& writer) {
+  const MeasuredPathNumbers& path = measured.paths[at];
+  const auto pair = [&](const std::array<double, 2>& two) {
+    return writer.number(two[0]) + ", " + writer.number(two[1]);
+  };
+  Words words = {{"$W_GAIN", writer.number(path.gain)},
+                 {"$W_SHARE", pair(path.share)},
+                 {"$W_LATE", pair(path.late)},
+                 {"$W_REACHED", pair(path.reached)},
+                 {"$W_NEWESTu", std::to_string(path.memory.size() - 1) + "u"},
+                 {"$FOUR", writer.number(4 * static_cast<double>(measured.paths.size()))}};
+  if (measured.paths.size() > 1) {
+    const std::string w = "w" + std::to_string(at + 1);
+    for (const auto& [before, after] : {std::pair{"takes_", "("},
+                                        {"after_", "("},
+                                        {"course_of_", "("},
+                                        {"advance_", "("},
+                                        {"settle_", "("},
+                                        {"newest_", ""},
+                                        {"o->", "["},
+                                        {"", "_given"},
+                                        {"", "_last"},
+                                        {"", "_lagged"},
+                                        {"", "_lost"}}) {
+      const std::string begins = before;
+      words.emplace_back(begins + "w" + after, begins + w + after);
+    }
+  }
+  words.emplace_back("$RING", measured.paths.size() > 1 ? "w" + std::to_string(at + 1) : "w");
+  return words;
+}
+
+/// The texts around it. @param settles whether there is a start
+inline std::string c_measured(const RecordedDesign& design, const ListWriter& writer,
+                              bool settles) {
+  const MeasuredNumbers& measured = design.measured;
+  const bool one = measured.paths.size() == 1;
+  const std::string sign = design.error_based ? "-" : "";
+  std::string paths;
+  std::string give;
+  std::string add;
+  std::string advance;
+  std::string settle;
+  std::string settle_each;
+  Words words;
+  for (std::size_t at = 0; at < measured.paths.size(); ++at) {
+    words = c_words_of_w(measured, at, writer);
+    const std::string number = std::to_string(at + 1);
+    paths += filled(c_source_measured, words);
+    if (!one) {
+      paths += filled(filled(c_source_measured_advance, {{"$W_SAMPLE", c_source_measured_sample}}),
+                      words);
+      give += "  o->w" + number + "_given = " + sign + "w[" + std::to_string(at) + "];\n";
+      add += filled("  all = all + ($W_GAIN * course_of_w(o, &passed));\n", words);
+      advance += "  advance_w" + number + "(o);\n";
+      settle += "  settle_w" + number + "(o);\n";
+    }
+    settle_each += filled(c_source_measured_settle, words);
+  }
+  std::string text =
+      paths +
+      (one ? filled(std::string(c_source_measured_effect) + c_source_measured_sample, words)
+           : c_source_measured_effects) +
+      c_source_measured_tell;
+  if (settles) text += "$W_UPDATE" + settle_each + (one ? "" : c_source_measured_settle_all);
+  if (!settles) text += "$W_UPDATE";
+  return filled(text, {{"$W_FORGET", one ? "  o->w_is_new = 0u;\n" : ""},
+                       {"$W_TOLD", one ? "  o->w_told = effect_of_w(o);\n" : ""},
+                       {"$W_GIVE", one ? "  o->w_given = " + sign + "w;\n" : give},
+                       {"$W_ADD_ALL", add},
+                       {"$W_ADVANCE_ALL", advance},
+                       {"$W_SETTLE_ALL", settle}});
+}
+
 /// What the texts need of any design.
 inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
   const std::string real = writer.real();
@@ -161,25 +237,37 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
     }
   }
   const MeasuredNumbers& measured = design.measured;
-  const auto pair = [&](const std::array<double, 2>& two) {
-    return writer.number(two[0]) + ", " + writer.number(two[1]);
-  };
-  const std::string newest_w = std::to_string(measured.on ? measured.memory.size() - 1 : 0) + "u";
   if (measured.on) {
-    members += "  " + real + " w[" + std::to_string(measured.memory.size()) +
-               "]; /* measured, a ring */\n  " + real + " w_given; /* by $name_measured */\n  " +
-               real + " w_last; /* the last good one */\n  " + real +
-               " w_lagged; /* behind dead time and lag */\n  " + real +
-               " w_told; /* its part of the disturbance */\n  uint32_t w_lost;\n" +
-               "  uint16_t newest_w;\n  uint8_t w_is_new;\n";
-    for (std::size_t i = 0; i < measured.memory.size(); ++i) {
-      init += "  o->w[" + std::to_string(i) + "] = " + writer.number(measured.memory[i]) + ";\n";
+    const bool one = measured.paths.size() == 1;
+    const std::string told =
+        "  " + real + " w_told; /* " + (one ? "its" : "their") + " part of the disturbance */\n";
+    const std::string set_told = "  o->w_told = " + writer.number(measured.told) + ";\n";
+    for (std::size_t w = 0; w < measured.paths.size(); ++w) {
+      const MeasuredPathNumbers& path = measured.paths[w];
+      std::string more = "  " + real + " $RING[" + std::to_string(path.memory.size()) +
+                         "]; /* measured, a ring */\n  " + real +
+                         " w_given; /* by $name_measured */\n  " + real +
+                         " w_last; /* the last good one */\n  " + real +
+                         " w_lagged; /* behind dead time and lag */\n" + (one ? told : "") +
+                         "  uint32_t w_lost;\n  uint16_t newest_w;\n";
+      std::string set;
+      for (std::size_t i = 0; i < path.memory.size(); ++i) {
+        set += "  o->w[" + std::to_string(i) + "] = " + writer.number(path.memory[i]) + ";\n";
+      }
+      set += "  o->w_given = $ZERO;\n  o->w_last = " + writer.number(path.last) +
+             ";\n  o->w_lagged = " + writer.number(path.lagged) + ";\n" + (one ? set_told : "") +
+             "  o->w_lost = " + std::to_string(path.lost) +
+             "u;\n  o->newest_w = " + std::to_string(path.memory.size() - 1) + "u;\n";
+      const Words numbered = c_words_of_w(measured, w, writer);
+      members += filled(more, numbered);
+      init += filled(set, numbered);
     }
-    init += "  o->w_given = $ZERO;\n  o->w_last = " + writer.number(measured.last) +
-            ";\n  o->w_lagged = " + writer.number(measured.lagged) +
-            ";\n  o->w_told = " + writer.number(measured.told) +
-            ";\n  o->w_lost = " + std::to_string(measured.lost) +
-            "u;\n  o->newest_w = " + newest_w + ";\n  o->w_is_new = 0u;\n";
+    if (!one) {
+      members += told;
+      init += set_told;
+    }
+    members += "  uint8_t w_is_new;\n";
+    init += "  o->w_is_new = 0u;\n";
   }
   const GuardNumbers& guard = design.guard;
   std::string found;
@@ -325,16 +413,12 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
        measured.on
            ? "/* w, measured, before the sample at which it begins to act; without it, or if "
              "it is not finite,\n * the last good one counts for $W_MOST samples, then zero. "
-             "*/\nvoid $name_measured($name_state *o, $real w);\n\n"
+             "*/\nvoid $name_measured($name_state *o, $W_ARGUMENT);\n\n"
            : ""},
-      {"$W_GAIN", writer.number(measured.gain)},
-      {"$W_SHARE", pair(measured.share)},
-      {"$W_LATE", pair(measured.late)},
-      {"$W_REACHED", pair(measured.reached)},
-      {"$W_NEWESTu", newest_w},
+      {"$W_ARGUMENT", measured.paths.size() > 1
+                          ? "const $real w[" + std::to_string(measured.paths.size()) + "]"
+                          : "$real w"},
       {"$W_MOST", std::to_string(measured.most_lost)},
-      {"$W_SIGN", design.error_based ? "-" : ""},
-      {"$FOUR", writer.number(4)},
       {"$SETTLE_W", measured.on && design.is_controller ? "  settle_w(o);\n" : ""},
       {"$OF_GUARD",
        guard.on ? "/* From the next correction on, those of the disturbance count so much, 0 .. 1. "
@@ -494,16 +578,20 @@ inline Words c_loop_words(const RecordedDesign& design, const ListWriter& writer
                                                           " .. " + writer.number(design.upper)},
       {"$REFERENCE",
        design.compensates ? "the u0 of the controller that is helped" : "the reference"},
+      // In a function of its own where two call it: MISRA 8.7.
+      {"$OWN_MISS", divides ? std::string("static $real miss($name_state *o, $real r)\n{\n") +
+                                  c_source_miss + "}\n\n"
+                            : ""},
+      {"$TO_MISS", divides ? "  return miss(o, r);\n" : c_source_miss},
       {"$PHASE_MEMBER", divides ? "  uint16_t phase; /* a measurement is due at 0 */\n" : ""},
       {"$PHASE_INIT", divides ? "  o->phase = 0u;\n" : ""},
       {"$PHASE_NEXT", divides ? "  o->phase = (uint16_t)(o->phase + 1u);\n" +
                                     only("o->phase >= $DIVIDERu", "o->phase = 0u")
                               : ""},
-      {"$PHASE_BEFORE",
-       divides ? "  const bool planned = o->gap == $DUEu;\n" +
-                     only("o->phase != 0u", "return $name_update_without_measurement(o, r)") +
-                     "  o->phase = 1u;\n"
-               : ""},
+      {"$PHASE_BEFORE", divides
+                            ? "  const bool planned = o->gap == $DUEu;\n" +
+                                  only("o->phase != 0u", "return miss(o, r)") + "  o->phase = 1u;\n"
+                            : ""},
       {"$PHASE_PLAN", divides ? "  const bool planned = o->gap == $DUEu;\n" : ""},
       {"$PHASE_SKIP",
        divides ? "  if (o->phase != 0u) {\n    o->phase = (uint16_t)(o->phase + 1u);\n    if "
@@ -595,9 +683,10 @@ inline CCode c_texts(const RecordedDesign& design, const std::string& mark) {
   }
   const bool measures = design.measured.on;
   if (measures) {
-    add(c_source_measured);
-    if (!gated && !design.law.watches) add(c_source_measured_update);
-    if (controls) add(c_source_measured_settle);
+    const bool updates = !gated && !design.law.watches;
+    add(filled(c_measured(design, writer, controls),
+               {{"$W_UPDATE", updates ? c_source_measured_update : ""}})
+            .c_str());
     predict = "measured";
   }
   if (design.law.watches) {

@@ -632,7 +632,7 @@ $HARDEN$GATE_START  o->gap = 0u;
   return 0u;
 }
 
-$real $name_update($name_state *o, $real y, $real r)
+$OWN_MISS$real $name_update($name_state *o, $real y, $real r)
 {
   unsigned status;
 $PHASE_BEFORE  status = update_$top(o, $MEASURED, o->u_last);
@@ -646,16 +646,20 @@ $PHASE_AFTER  o->status = (uint8_t)status;
 
 $real $name_update_without_measurement($name_state *o, $real r)
 {
-$PHASE_NEXT  o->status = (uint8_t)predict_$top(o, o->u_last);
-  judge_missing(o);
-  return put_out(o, r);
-}
+$TO_MISS}
 
 void $name_applied($name_state *o, $real u)
 {
   (void)applied(o, u);
 }
 
+)";
+
+/// A sample without a measurement.
+inline constexpr const char* c_source_miss =
+    R"($PHASE_NEXT  o->status = (uint8_t)predict_$top(o, o->u_last);
+  judge_missing(o);
+  return put_out(o, r);
 )";
 
 /// Compares with samples of the design.

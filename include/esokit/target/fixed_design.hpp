@@ -440,7 +440,7 @@ class FixedDesign {
                     "is in Guarded, which is not written in fixed point");
     }
     if (design_->measured.on) {
-      return refuse("observer", design_->measured.gain,
+      return refuse("observer", design_->measured.paths[0].gain,
                     "is in Measured, which is not written in fixed point");
     }
     if (design_->known.on) {

@@ -140,19 +140,24 @@ struct GuardNumbers {
   bool frozen = false;
 };
 
-/// A Measured of one disturbance.
-struct MeasuredNumbers {
-  bool on = false;
+/// One of the disturbances of a Measured.
+struct MeasuredPathNumbers {
   double gain = 0;
   std::array<double, 2> share{};  ///< of a sample in which the older and the newer w arrive,
   std::array<double, 2> late{};   ///< and what the lag does in these
   std::array<double, 2> reached{};
-  unsigned most_lost = 0;
   std::vector<double> memory{};  ///< the newest last
   double lagged = 0;
   double last = 0;
-  double told = 0;
   unsigned lost = 0;
+};
+
+/// A Measured.
+struct MeasuredNumbers {
+  bool on = false;
+  unsigned most_lost = 0;
+  double told = 0;
+  std::vector<MeasuredPathNumbers> paths{};
 };
 
 /// A KnownModel.
@@ -657,25 +662,26 @@ struct RecordAccess {
   struct Empty {};
   template <class O>
   static MeasuredNumbers measured(const O& o) {
-    MeasuredNumbers numbers;
-    const auto& path = o.paths_[0];
     const auto number = [](const auto& x) { return static_cast<double>(x); };
-    numbers.on = true;
-    numbers.gain = number(path.input_.gain);
-    for (std::size_t i = 0; i < 2; ++i) {
-      numbers.share[i] = number(path.share_[i]);
-      numbers.late[i] = number(path.late_[i]);
-      numbers.reached[i] = number(path.reached_[i]);
+    MeasuredNumbers all{true, static_cast<unsigned>(o.most_lost_), number(o.told_), {}};
+    for (std::size_t w = 0; w < o.paths_.size(); ++w) {
+      const auto& path = o.paths_[w];
+      MeasuredPathNumbers numbers;
+      numbers.gain = number(path.input_.gain);
+      for (std::size_t i = 0; i < 2; ++i) {
+        numbers.share[i] = number(path.share_[i]);
+        numbers.late[i] = number(path.late_[i]);
+        numbers.reached[i] = number(path.reached_[i]);
+      }
+      for (int age = path.whole_ + 1; age >= 0; --age) {
+        numbers.memory.push_back(number(path.before(age)));
+      }
+      numbers.lagged = number(path.lagged_);
+      numbers.last = number(o.last_[w]);
+      numbers.lost = static_cast<unsigned>(o.lost_[w]);
+      all.paths.push_back(numbers);
     }
-    numbers.most_lost = static_cast<unsigned>(o.most_lost_);
-    for (int age = path.whole_ + 1; age >= 0; --age) {
-      numbers.memory.push_back(number(path.before(age)));
-    }
-    numbers.lagged = number(path.lagged_);
-    numbers.last = number(o.last_[0]);
-    numbers.told = number(o.told_);
-    numbers.lost = static_cast<unsigned>(o.lost_[0]);
-    return numbers;
+    return all;
   }
 
   /// What a monitor computes from its settings alone, and of the controller that it watches.
@@ -780,13 +786,13 @@ template <class Observer>
 inline constexpr bool is_adapter =
     IsDelayed<Observer>::value || IsGate<Observer>::value || IsWrapped<Observer>::value ||
     IsGuarded<Observer>::value || IsMeasured<Observer>::value;
-/// One disturbance, told once and inside a WrappedOutput: around it the angle is read otherwise.
+/// Told at one place, and inside a WrappedOutput: around it the angle is read otherwise.
 template <class Observer>
 inline constexpr bool measures_plainly = [] {
   if constexpr (IsMeasured<Observer>::value) {
     using Inside = typename Observer::Adapted;
-    return Observer::inputs == 1 && !observer_traits<Inside>.takes_measured &&
-           !observer_traits<Inside>.wraps_output && measures_plainly<Inside>;
+    return !observer_traits<Inside>.takes_measured && !observer_traits<Inside>.wraps_output &&
+           measures_plainly<Inside>;
   } else if constexpr (IsGuarded<Observer>::value) {
     return !observer_traits<typename Observer::Adapted>.takes_measured;
   } else if constexpr (is_adapter<Observer> || IsKnown<Observer>::value) {
