@@ -49,6 +49,9 @@ struct KnownModelConfig {
 ///
 /// The change of fbar within a step, O(T), remains in dhat. Because fbar is computed from the
 /// estimate, it is part of the error dynamics: omega_o should be well above the slopes of fbar.
+///
+/// A function that is generic in the scalar, `template <class E> auto operator()(const E& x) const
+/// noexcept` with `select` for branches, can be written in C by `to_c`, too.
 /// @tparam Model your function fbar(estimate)
 template <ShiftableDisturbance Observer, class Model>
 requires PlantModel<Model, Observer>

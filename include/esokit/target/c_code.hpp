@@ -813,19 +813,21 @@ inline CCode c_code(const RecordedDesign& design) {
 ///
 /// Written are LinearEso, also with a set of poles, HalfGainEso, ReducedOrderEso, CascadeEso,
 /// AdjustableBandwidthEso, NonlinearEso, ModelEso, PlantEso and their cascades (not with
-/// `follows_speed`), these in KnownModel if its function is generic, AlgebraicEso,
-/// ExtendedStateFilter (in its modes recursive and frozen, without a nominal model), these in
-/// DelayedInput and OutlierGate or WrappedOutput, in Measured with one disturbance (around no
-/// WrappedOutput, but inside it, and not in Guarded), LinearEso and CascadeEso in Guarded, too (a
-/// changing b0 unless the law softens), and Adrc of both forms and DisturbanceCompensator around
-/// them, and PredictiveAdrc around one of a single level with constant gains and no sensor in its
-/// model, without an adapter. Others do not compile. The function of a KnownModel is recorded like
-/// all else, with its own numbers as constants: it is `template <class E> auto operator()(const E&
-/// x) const noexcept`, or a template of the scalar with `with_scalar`. It adds, multiplies and
-/// compares numbers of the observer's scalar (and integers), and calls abs, sqrt, pow, exp, expm1,
-/// sin, cos, tan, atan and tanh as by `using std::sin;`. A branch on a value does not compile:
-/// `select(condition, a, b)` chooses. SmoothProfile and HealthMonitor: target/profile_code.hpp and
-/// target/health_code.hpp.
+/// `follows_speed`), AlgebraicEso, ExtendedStateFilter (in its modes recursive and frozen, without
+/// a nominal model), these in DelayedInput, OutlierGate and WrappedOutput, in KnownModel if its
+/// function is generic (not AlgebraicEso), in Measured (not around WrappedOutput or another
+/// Measured, and not in Guarded), LinearEso and CascadeEso in Guarded, too (a changing b0 unless
+/// the law softens), Adrc of both forms and DisturbanceCompensator around them, and PredictiveAdrc
+/// around one of a single level with constant gains and no sensor in its model, without an adapter.
+/// Others do not compile.
+///
+/// The function of a KnownModel is recorded like all else, with its own numbers as constants: it is
+/// `template <class E> auto operator()(const E& x) const noexcept`, or a template of the scalar
+/// with `with_scalar`. It adds, multiplies and compares numbers of the observer's scalar (and
+/// integers), and calls abs, sqrt, pow, exp, expm1, sin, cos, tan, atan and tanh as by `using
+/// std::sin;`. A branch on a value does not compile: `select(condition, a, b)` chooses.
+///
+/// SmoothProfile and HealthMonitor: target/profile_code.hpp and target/health_code.hpp.
 /// @param object as `make` returned it: its state is that of `init`
 /// @return error for a name that is no identifier, a comment that would end the one it stands in, a
 ///         number of samples of the self-test out of range, or a gain law of your own whose gain
@@ -848,9 +850,8 @@ void to_c(const Other&, const CodeOptions& = {}) {
       !detail::knows_in_general<Other> || detail::Writable<Other>,
       "esokit: to_c writes LinearEso, HalfGainEso, ReducedOrderEso, CascadeEso, "
       "AdjustableBandwidthEso, NonlinearEso, ModelEso, PlantEso, AlgebraicEso and "
-      "ExtendedStateFilter, these in KnownModel (not AlgebraicEso), DelayedInput and OutlierGate "
-      "or WrappedOutput, in Measured "
-      "with one disturbance, on the chain with one extended state in Guarded, and "
+      "ExtendedStateFilter, these in DelayedInput, OutlierGate, WrappedOutput and Measured, in "
+      "KnownModel (not AlgebraicEso), on the chain with one extended state in Guarded, and "
       "Adrc and DisturbanceCompensator around them, and PredictiveAdrc around one with constant "
       "gains; no other gains, adapters or controllers yet");
 }
