@@ -227,7 +227,9 @@ class NamedAdapter : public Adapter<Observer> {
   }
 
   /// Time update only, see PredictorCorrector::predict.
-  StatusOf<scalar_type> predict(scalar_type u_applied) noexcept { return this->observer_.predict(u_applied); }
+  StatusOf<scalar_type> predict(scalar_type u_applied) noexcept {
+    return this->observer_.predict(u_applied);
+  }
 
   /// Measurement update only, see PredictorCorrector::correct.
   StatusOf<scalar_type> correct(scalar_type y) noexcept { return this->observer_.correct(y); }
@@ -236,7 +238,9 @@ class NamedAdapter : public Adapter<Observer> {
   StatusOf<scalar_type> reset(scalar_type y) noexcept { return this->observer_.reset(y); }
 
   /// Restarts at a given estimate, N x 1.
-  StatusOf<scalar_type> reset(const Estimate& state) noexcept { return this->observer_.reset(state); }
+  StatusOf<scalar_type> reset(const Estimate& state) noexcept {
+    return this->observer_.reset(state);
+  }
 
  protected:
   using Base::Base;
