@@ -9,6 +9,7 @@
 #include <esokit/core/expected.hpp>
 #include <esokit/core/lanes.hpp>
 #include <esokit/model/linear_plant.hpp>
+#include <esokit/sim/held_plant.hpp>
 #include <esokit/sim/run_config.hpp>
 #include <esokit/sim/runge_kutta.hpp>
 #include <limits>
@@ -85,10 +86,12 @@ class InputQueue {
 template <class Time, class From>
 Error<Time> as_error(const Error<From>& error) {
   return {error.field,
-          static_cast<Time>(esokit::detail::value_in_lane(error.value, error.lane)),
+          static_cast<Time>(
+              esokit::detail::number_of_lane(error.value, error.lane < 0 ? 0 : error.lane)),
           error.rule,
           error.index,
-          static_cast<Time>(esokit::detail::value_in_lane(error.limit, error.lane)),
+          static_cast<Time>(
+              esokit::detail::number_of_lane(error.limit, error.lane < 0 ? 0 : error.lane)),
           error.has_limit,
           error.lane};
 }
