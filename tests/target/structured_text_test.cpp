@@ -14,6 +14,7 @@
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/model_eso.hpp>
 #include <esokit/target/structured_text.hpp>
+#include <support/friction.hpp>
 #include <target/written.hpp>
 
 namespace esokit_test {
@@ -183,6 +184,9 @@ TEST(StructuredText, RefusesByName) {
   using Told = Measured<LinearEso<1, double>, 1, 4>;
   EXPECT_EQ(refusal(Told::make(observer_config<Told>(8)).value()),
             "measured: is not written in Structured Text");
+  using Known = KnownModel<LinearEso<1, double>, Friction<0, double>>;
+  EXPECT_EQ(refusal(Known::make(observer_config<Known>(8)).value()),
+            "model: of KnownModel is not written in Structured Text");
   using Ahead = PredictiveAdrc<LinearEso<1, double>>;
   Ahead::Config ahead{.observer = observer_config<LinearEso<1, double>>(8)};
   ahead.controller_bandwidth = 3;

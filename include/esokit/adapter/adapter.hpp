@@ -39,8 +39,9 @@ struct ExtensionOf<Observer> {
 template <LoopObserver Observer>
 class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Observer> {
   friend struct detail::GuardAccess;
+  friend struct detail::LaneAccess;
   static_assert(
-      PlainScalar<typename Observer::scalar_type>,
+      PlainScalar<typename Observer::scalar_type> || records<typename Observer::scalar_type>,
       "esokit: an adapter is of plain scalars; for packs: Packed<DelayedInput<..>, lanes>");
 
  public:
@@ -178,6 +179,8 @@ class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Ob
   /// @}
 
  protected:
+  static constexpr int data_members = 1;  // see LaneAccess
+
   /// Stores a copy.
   explicit constexpr Adapter(const Observer& observer) noexcept : observer_(observer) {}
 
@@ -234,16 +237,20 @@ class NamedAdapter : public Adapter<Observer> {
   }
 
   /// Time update only, see PredictorCorrector::predict.
-  StepStatus predict(scalar_type u_applied) noexcept { return this->observer_.predict(u_applied); }
+  StatusOf<scalar_type> predict(scalar_type u_applied) noexcept {
+    return this->observer_.predict(u_applied);
+  }
 
   /// Measurement update only, see PredictorCorrector::correct.
-  StepStatus correct(scalar_type y) noexcept { return this->observer_.correct(y); }
+  StatusOf<scalar_type> correct(scalar_type y) noexcept { return this->observer_.correct(y); }
 
   /// Restarts at (y, 0, .., 0).
-  StepStatus reset(scalar_type y) noexcept { return this->observer_.reset(y); }
+  StatusOf<scalar_type> reset(scalar_type y) noexcept { return this->observer_.reset(y); }
 
   /// Restarts at a given estimate, N x 1.
-  StepStatus reset(const Estimate& state) noexcept { return this->observer_.reset(state); }
+  StatusOf<scalar_type> reset(const Estimate& state) noexcept {
+    return this->observer_.reset(state);
+  }
 
  protected:
   using Base::Base;

@@ -280,8 +280,13 @@ class Adrc {
   /// u for a reference, as ControlLoop asks for it.
   template <class Given>
   ESOKIT_INLINE auto asked(const Given& reference) noexcept {
-    return [this, &reference](bool special)
-               ESOKIT_INLINE_LAMBDA { return special ? judged(reference) : command(reference); };
+    if constexpr (std::is_same_v<Given, S>) {  // a number that need not lie in memory
+      return [this, reference](bool special)
+                 ESOKIT_INLINE_LAMBDA { return special ? judged(reference) : command(reference); };
+    } else {
+      return [this, &reference](bool special)
+                 ESOKIT_INLINE_LAMBDA { return special ? judged(reference) : command(reference); };
+    }
   }
   struct NoSpec {
     constexpr NoSpec() = default;

@@ -356,7 +356,7 @@ class ControlLoop {
   }
 
   template <class Law>
-  S put_out(Law&& law) noexcept {
+  S put_out(Law law) noexcept {
     return limited(mode_ == LoopMode::running ? S(law(true)) : other_output());
   }
 

@@ -351,7 +351,7 @@ class RiccatiGain {
     take_factor();
   }
 
-  constexpr void recur_usually(bool had_correction) noexcept {
+  ESOKIT_INLINE constexpr void recur_usually(bool had_correction) noexcept {
     Factor scaled;
     const Factor* noise = &noise_;
     if (rule_ == InflationRule::adaptive) [[unlikely]] {

@@ -34,35 +34,20 @@ struct Language {
   const char* most[2];             ///< the largest number
   const char* from_state;          ///< before the name of a number of the object
   char exponent;                   ///< between mantissa and exponent
-  std::array<const char*, 21> of;  ///< each Operation
+  std::array<const char*, 26> of;  ///< each Operation
 };
 
-inline constexpr Language c_language{{"double", "float"},
-                                     {"", "f"},
-                                     {"", ""},
-                                     "o->",
-                                     'e',
-                                     {"",
-                                      "",
-                                      "$a + $b",
-                                      "$a - $b",
-                                      "$a * $b",
-                                      "$a / $b",
-                                      "-$a",
-                                      "fabs$f($a)",
-                                      "sqrt$f($a)",
-                                      "pow$f($a, $b)",
-                                      "exp$f($a)",
-                                      "expm1$f($a)",
-                                      "$a ? $b : $c",
-                                      "$a < $b",
-                                      "$a > $b",
-                                      "$a <= $b",
-                                      "$a >= $b",
-                                      "is_finite($a)",
-                                      "$a && $b",
-                                      "$a || $b",
-                                      "!$a"}};
+inline constexpr Language c_language{
+    {"double", "float"},
+    {"", "f"},
+    {"", ""},
+    "o->",
+    'e',
+    {"",          "",           "$a + $b",    "$a - $b",       "$a * $b",       "$a / $b",
+     "-$a",       "fabs$f($a)", "sqrt$f($a)", "pow$f($a, $b)", "exp$f($a)",     "expm1$f($a)",
+     "sin$f($a)", "cos$f($a)",  "tan$f($a)",  "atan$f($a)",    "tanh$f($a)",    "$a ? $b : $c",
+     "$a < $b",   "$a > $b",    "$a <= $b",   "$a >= $b",      "is_finite($a)", "$a && $b",
+     "$a || $b",  "!$a"}};
 
 /// IEC 61131-3. ABS(x) <= the largest number is false for NaN and infinity.
 inline constexpr Language st_language{{"LREAL", "REAL"},
@@ -82,6 +67,11 @@ inline constexpr Language st_language{{"LREAL", "REAL"},
                                        "EXPT($a, $b)",
                                        "EXP($a)",
                                        "EXP($a) - 1.0",
+                                       "SIN($a)",
+                                       "COS($a)",
+                                       "TAN($a)",
+                                       "ATAN($a)",
+                                       "1.0 - 2.0 / (EXP(2.0 * $a) + 1.0)",
                                        "SEL($a, $c, $b)",
                                        "$a < $b",
                                        "$a > $b",

@@ -516,7 +516,7 @@ inline std::string structured_text(const RecordedDesign& design) {
 /// sample. NaN and infinity are refused by ABS(x) <= the largest number, which every PLC has.
 ///
 /// Not written are gains that go on at each sample (AlgebraicEso, ExtendedStateFilter) and angles
-/// (WrappedOutput), nor Guarded and Measured: their text is that of C alone.
+/// (WrappedOutput), nor Guarded, Measured and KnownModel: their text is that of C alone.
 /// @param object as for to_c @return the text of the block, or an error as for to_c, or for one of
 ///        these
 template <detail::Writable Object>
@@ -535,7 +535,8 @@ Expected<std::string, Error<typename Object::scalar_type>> to_structured_text(
                "is not written in Structured Text")
       .require(!design->predictive, "PredictiveAdrc", V(0), "is not written in Structured Text")
       .require(!design->guard.on, "guarded", V(0), "is not written in Structured Text")
-      .require(!design->measured.on, "measured", V(0), "is not written in Structured Text");
+      .require(!design->measured.on, "measured", V(0), "is not written in Structured Text")
+      .require(!design->known.on, "model", V(0), "of KnownModel is not written in Structured Text");
   if (!rules) return rules.error();
   return detail::structured_text(*design);
 }
