@@ -12,7 +12,7 @@
 #include <esokit/analysis/linear_system.hpp>
 #include <esokit/gain/sampled_gain.hpp>
 #include <esokit/model/chain_model.hpp>
-#include <esokit/model/integrator_chain.hpp>
+#include <esokit/analysis/integrator_chain.hpp>
 #include <esokit/model/sampled_model.hpp>
 #include <esokit/observer/concepts.hpp>
 #include <esokit/sim/continuous_observer.hpp>
