@@ -1,8 +1,8 @@
 /// @file
 /// ExtendedStateFilter beside LinearEso of the same size and a Kalman filter on dense matrices:
 /// with the recursion at every sample, and with the frozen gain.
+#include <esokit/analysis/integrator_chain.hpp>
 #include <esokit/eigen.hpp>
-#include <esokit/model/integrator_chain.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <string>

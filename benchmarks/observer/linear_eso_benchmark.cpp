@@ -2,6 +2,7 @@
 /// LinearEso and CascadeEso beside hand-written code for the same maths and a dense Eigen observer.
 #include <array>
 #include <cmath>
+#include <esokit/analysis/integrator_chain.hpp>
 #include <esokit/control/adrc_law.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/observer/cascade_eso.hpp>

@@ -11,6 +11,7 @@
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/sim/counted_gaussian.hpp>
 #include <esokit/sim/gaussian.hpp>
+#include <esokit/sim/held_plant.hpp>
 #include <esokit/sim/run.hpp>
 #include <optional>
 #include <vector>

@@ -20,8 +20,8 @@ using detail::Writable;
 template <class Observer>
 using Late = Measured<Observer, 1, 4>;
 
-// Several disturbances, two of them, and one around an angle.
-static_assert(Writable<Measured<LinearEso<2>>> && !Writable<Measured<LinearEso<2>, 2>> &&
+// Told twice, and around an angle or in a guard.
+static_assert(Writable<Measured<LinearEso<2>>> && Writable<Measured<LinearEso<2>, 2>> &&
               !Writable<Measured<Measured<LinearEso<2>>>> &&
               !Writable<Measured<WrappedOutput<LinearEso<2>>>> &&
               !Writable<Guarded<Measured<LinearEso<2>>>>);
@@ -43,6 +43,17 @@ TEST(CGuarded, OfAMeasuredDisturbance) {
   equals_controller<Adrc<Late<OutlierGate<LinearEso<1, float>>>, ErrorBased>>(30000, 871);
   equals_controller<DisturbanceCompensator<Late<LinearEso<1, double>>>>(30000, 881, "gcc -std=c99",
                                                                         3);
+}
+
+/// Each with a dead time, a lag and losses of its own.
+TEST(CGuarded, OfSeveralMeasuredDisturbances) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  equals<Measured<LinearEso<2, double>, 2, 4>>(30000, 941);
+  equals<DelayedInput<OutlierGate<Measured<LinearEso<2, float>, 3, 4>>, 3>>(30000, 951);
+  observes<Measured<CascadeEso<1, 2, double>, 3, 4>>(30000, 961);
+  equals<WrappedOutput<Measured<ExtendedStateFilter<2, double>, 2, 4>>>(30000, 971);
+  equals_controller<Adrc<Measured<LinearEso<1, float>, 2, 4>, ErrorBased>>(30000, 981,
+                                                                           "gcc -std=c99", 2);
 }
 
 /// Pin, hold, release and a changing b0, which every comparison of a Guarded has, with a bound in
@@ -79,15 +90,9 @@ TEST(CGuarded, FrozenAfterAHold) {
   equals_changed<Adrc<Settling>>(30000, 931, "gcc -std=c99", pair);
 }
 
-/// As of others, see c_code_test.cpp.
-template <class C>
-void compiles() {
-  SCOPED_TRACE(testing::internal::GetTypeName<C>());
-  compiles_elsewhere(to_c(C::make(config<C>(8)).value(), {.name = "loop"}).value(), "loop");
-}
-
 TEST(CGuarded, CompilesWithOtherCompilers) {
   compiles<Adrc<Late<LinearEso<2, float>>>>();
+  compiles<Adrc<Measured<LinearEso<2, float>, 3, 4>>>();
   compiles<Adrc<Guarded<DelayedInput<WrappedOutput<CascadeEso<2, 2, float>>, 3>>>>();
   compiles<DisturbanceCompensator<DelayedInput<OutlierGate<Late<LinearEso<1, double>>>, 3>>>();
 }

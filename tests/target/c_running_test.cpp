@@ -18,16 +18,6 @@ namespace target_c_running_test {
 
 using namespace esokit;
 
-/// The config of the observer in a controller's, inside its adapters.
-template <class Config>
-auto& innermost(Config& config) {
-  if constexpr (requires { config.observer; }) {
-    return innermost(config.observer);
-  } else {
-    return config;
-  }
-}
-
 TEST(CRunning, OfASchedule) {
   if (!there("gcc")) GTEST_SKIP() << "no gcc";
   equals<AlgebraicEso<2, double>>(30000, 401);
@@ -81,6 +71,24 @@ TEST(CRunning, OfAnglesByTurns) {
   equals_controller<DisturbanceCompensator<WrappedOutput<LinearEso<1, double>>>>(30000, 581);
 }
 
+/// A gate inside: turns are counted twice.
+TEST(CRunning, OfAnglesByTurnsAroundAGate) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  equals<WrappedOutput<OutlierGate<LinearEso<2, double>>>>(30000, 751);
+  equals<DelayedInput<WrappedOutput<OutlierGate<LinearEso<2, float>>>, 3>>(30000, 761);
+  observes<WrappedOutput<OutlierGate<CascadeEso<1, 2, double>>>>(30000, 771);
+  equals<WrappedOutput<OutlierGate<ModelEso<lag, float>>>>(30000, 781);
+  equals<Guarded<WrappedOutput<OutlierGate<LinearEso<2, double>>>>>(30000, 791);
+  equals<WrappedOutput<ExtendedStateFilter<2, double>>>(30000, 1301);  // it has a gate of its own
+  equals_changed<Adrc<WrappedOutput<ExtendedStateFilter<2, double>>>>(
+      30000, 1311, "gcc -std=c99",
+      [](auto& settings) { innermost(settings).outlier_threshold = 25; });
+  equals_changed<DisturbanceCompensator<WrappedOutput<OutlierGate<LinearEso<1, float>>>>>(
+      30000, 1321, "gcc -std=c99", [](auto& settings) {
+        settings.observer.observer.threshold = settings.observer.observer.running_factor = 0;
+      });
+}
+
 TEST(CRunning, OfGuards) {
   if (!there("gcc")) GTEST_SKIP() << "no gcc";
   equals<Guarded<LinearEso<2, double>>>(30000, 601);
@@ -95,40 +103,11 @@ TEST(CRunning, OfGuards) {
                                                                   without_leak);
 }
 
-/// As of others, see c_code_test.cpp.
-template <class C>
-void compiles() {
-  SCOPED_TRACE(testing::internal::GetTypeName<C>());
-  const CCode code = to_c(C::make(config<C>(8)).value(), {.name = "loop"}).value();
-  compiles_elsewhere(code, "loop");
-}
-
 TEST(CRunning, CompilesWithOtherCompilers) {
   compiles<Adrc<AlgebraicEso<2, float>>>();
   compiles<Adrc<ExtendedStateFilter<1, float>>>();
+  compiles<Adrc<WrappedOutput<OutlierGate<LinearEso<2, float>>>>>();
   compiles<Adrc<Guarded<DelayedInput<WrappedOutput<LinearEso<2, float>>, 3>>>>();
-}
-
-/// Bad numbers are refused whatever the compiler assumes of them.
-template <class C>
-void refuses_under_fast_math() {
-  SCOPED_TRACE(testing::internal::GetTypeName<C>());
-  using V = typename C::scalar_type;
-  const Folder folder;
-  InC<V> in_c(folder, to_c(C::make(config<C>(8)).value(), {.name = "loop"}).value(), true,
-              "gcc -std=gnu99 -ffast-math -Wno-error");
-  ASSERT_TRUE(in_c.loaded());
-  for (const V bad : {hidden_nan<V>(), hidden_infinity<V>(), -hidden_infinity<V>()}) {
-    for (int k = 0; k < 20; ++k) EXPECT_TRUE(is_finite(in_c.update(V(0.1), V(0.2))));
-    EXPECT_TRUE(is_finite(in_c.update(bad, V(0.2))));
-    EXPECT_EQ(in_c.probe() % 2, 1u) << "measurement_rejected";
-    EXPECT_TRUE(is_finite(in_c.update(V(0.1), bad)));
-    in_c.applied(bad);
-    EXPECT_TRUE(is_finite(in_c.update(V(0.1), V(0.2))));
-    EXPECT_NE(in_c.start(bad, V(0)), 0u);
-    EXPECT_NE(in_c.start(V(0), bad), 0u);
-    for (unsigned row = 0; row < 2; ++row) EXPECT_TRUE(is_finite(in_c.estimate(row)));
-  }
 }
 
 TEST(CRunning, RefusesBadNumbersUnderFastMath) {
@@ -136,83 +115,6 @@ TEST(CRunning, RefusesBadNumbersUnderFastMath) {
   refuses_under_fast_math<Adrc<AlgebraicEso<1, float>>>();
   refuses_under_fast_math<Adrc<ExtendedStateFilter<1, float>>>();
   refuses_under_fast_math<Adrc<Guarded<DelayedInput<WrappedOutput<LinearEso<2, float>>, 3>>>>();
-}
-
-/// Other settings while it runs, as by `adopt`.
-template <class C>
-void adopts(std::uint64_t seed) {
-  SCOPED_TRACE(testing::internal::GetTypeName<C>());
-  using V = typename C::scalar_type;
-  auto settings = config<C>(8);
-  const C first = C::make(settings).value();
-  innermost(settings).observer_bandwidth = V(20);
-  if constexpr (requires { settings.controller_bandwidth; }) settings.controller_bandwidth = V(3);
-  settings.limits = {V(-1), V(1.5), V(60)};
-  const C second = C::make(settings).value();
-  settings.missing.most = 3;  // not one of the settings
-  const C third = C::make(settings).value();
-  CodeOptions options{.name = "loop", .comment = "a test", .settings_in_struct = true};
-  CCode code = to_c(first, options).value();
-  options.comment = "another";
-  options.settings_name = "slow";
-  const auto slow = to_c(second, options).value();
-  options.settings_name = "other";
-  const auto other = to_c(third, options).value();
-  const Folder folder;
-  const Library library(folder, code,
-                        slow.settings + other.settings +
-                            "unsigned loop_size(void);\n"
-                            "unsigned loop_size(void) { return sizeof(loop_state); }\n");
-  ASSERT_TRUE(library.loaded());
-  void (*init)(void*) = nullptr;
-  V (*update)(void*, V, V) = nullptr;
-  V (*estimate)(const void*, unsigned) = nullptr;
-  bool (*adopt)(void*, const void*) = nullptr;
-  int (*self_test)(V) = nullptr;
-  unsigned (*size)() = nullptr;
-  const void* sets[3] = {};
-  library.find(init, "loop_init");
-  library.find(update, "loop_update");
-  library.find(estimate, "loop_estimate");
-  library.find(adopt, "loop_adopt");
-  library.find(self_test, "loop_self_test");
-  library.find(size, "loop_size");
-  library.find(sets[0], "loop_design");
-  library.find(sets[1], "loop_slow");
-  library.find(sets[2], "loop_other");
-  EXPECT_EQ(self_test(V(0)), 0);
-  std::vector<std::uint64_t> state(size() / sizeof(std::uint64_t) + 1);
-  init(state.data());
-  C mine = first;
-  ChainPlant plant(C::order, 0.0078125, 8, 1.5);
-  Random random(seed);
-  V r(1);
-  int limited = 0;
-  for (int k = 0; k < 30000 && !testing::Test::HasFailure(); ++k) {
-    plant.step(static_cast<double>(mine.output()));
-    if (random.index(60) == 0) r = static_cast<V>(random.uniform(-4, 4));
-    V y = static_cast<V>(plant.output() + 1e-3 * random.uniform(-1, 1));
-    if (random.index(20) == 0) y = random.index(2) == 0 ? hidden_nan<V>() : anything<V>(random);
-    const int set = random.index(300);
-    if (set < 2) {
-      EXPECT_TRUE(mine.adopt(set == 0 ? first : second));
-      EXPECT_TRUE(adopt(state.data(), sets[set]));
-    }
-    if (set == 2) {
-      EXPECT_FALSE(adopt(state.data(), sets[2]));
-    }
-    V given = r;
-    if constexpr (!requires { mine.gains(); }) given = (r - y) / V(8);
-    const V u = mine.update(y, given);
-    EXPECT_TRUE(equal_bits(u, update(state.data(), y, given))) << "sample " << k;
-    detail::unroll<std::remove_cvref_t<decltype(mine.observer())>::size>([&](auto row) {
-      EXPECT_TRUE(equal_bits(V(mine.observer().template estimate<row>()),
-                             estimate(state.data(), unsigned{row})))
-          << "sample " << k << ", estimate " << row;
-    });
-    limited += !equal_bits(mine.output(), mine.requested());
-  }
-  EXPECT_GT(limited, 3000);
 }
 
 TEST(CRunning, AdoptsSettings) {

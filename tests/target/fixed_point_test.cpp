@@ -17,6 +17,7 @@
 #include <esokit/observer/half_gain_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <sstream>
+#include <support/friction.hpp>
 
 namespace esokit_test {
 namespace target_fixed_point_test {
@@ -740,6 +741,9 @@ TEST(FixedPoint, RefusesWhatIsNotLinear) {
   EXPECT_NE(refused(Wrapped::make(wrapped).value()).find("y.counter_bits"), std::string::npos);
   using Told = Measured<LinearEso<2>>;
   EXPECT_NE(refused(Told::make({.observer = wrapped.observer}).value()).find("is in Measured"),
+            std::string::npos);
+  using Known = KnownModel<LinearEso<2>, Friction<0, double>>;
+  EXPECT_NE(refused(Known::make({.observer = wrapped.observer}).value()).find("is in KnownModel"),
             std::string::npos);
 }
 

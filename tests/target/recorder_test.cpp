@@ -88,6 +88,16 @@ class Replay {
         return std::exp(a);
       case Operation::exponential_less_one:
         return std::expm1(a);
+      case Operation::sine:
+        return std::sin(a);
+      case Operation::cosine:
+        return std::cos(a);
+      case Operation::tangent:
+        return std::tan(a);
+      case Operation::arc_tangent:
+        return std::atan(a);
+      case Operation::hyperbolic_tangent:
+        return std::tanh(a);
       case Operation::choose:
         return a != 0 ? b : at(one.c);
       case Operation::less:
@@ -278,14 +288,14 @@ void obeys(const Fill& fill, int settle = 0, double share = 0.58) {
   using V = typename Object::scalar_type;
   for (const double input_gain : {8.0, -8.0}) {
     typename Object::Config config{};
-    auto& chain = [&]() -> auto& {
-      if constexpr (requires { config.observer; }) {
-        return config.observer;
+    const auto innermost = [](auto& some, const auto& again) -> auto& {
+      if constexpr (requires { some.observer; }) {
+        return again(some.observer, again);
       } else {
-        return config;
+        return some;
       }
-    }
-    ();
+    };
+    auto& chain = innermost(config, innermost);
     chain.sample_time = V(0.0078125);
     chain.input_gain = V(input_gain);
     chain.max_gap = 5;
@@ -363,6 +373,14 @@ TYPED_TEST(Recorded, ObserversWithModels) {
   });
 }
 
+TYPED_TEST(Recorded, ObserversWithKnownTerms) {
+  using V = TypeParam;
+  obeys<KnownModel<LinearEso<2, V>, Friction<1, V>>, Observe>([](auto& config) {
+    config.observer.observer_bandwidth = 30;
+    config.model.coefficient = V(0.5);
+  });
+}
+
 TYPED_TEST(Recorded, ObserversWithOtherGains) {
   using V = TypeParam;
   obeys<AdjustableBandwidthEso<2, V>, Observe>([](auto& config) {
@@ -430,6 +448,11 @@ TYPED_TEST(Recorded, Controllers) {
 
 // ---- What cannot be recorded yet.
 
+/// A known model of doubles.
+struct OfDouble {
+  double operator()(const Vector<double, 2>& x) const noexcept { return -x(0); }
+};
+
 /// Those whose pack is one plain object a lane: a recording scalar never gets into them.
 TEST(NotRecorded, WhatRunsLaneByLane) {
   using Plain = LinearEso<1>;
@@ -444,7 +467,7 @@ TEST(NotRecorded, WhatRunsLaneByLane) {
                {can_be_recorded<Guarded<Plain>>, "of plain scalars"},
                {can_be_recorded<VariableTime<Plain>>,
                 "of plain scalars, and its gains change with the time"},
-               {can_be_recorded<KnownModel<Plain, Friction<0, double>>>, "of plain scalars"},
+               {can_be_recorded<KnownModel<Plain, OfDouble>>, "its function is of one scalar"},
                {can_be_recorded<Adrc<DelayedInput<Plain, 4>>>, "its observer"},
                {can_be_recorded<DisturbanceCompensator<OutlierGate<Plain>>>, "its observer"},
                {can_be_recorded<MimoAdrc<Plain, Plain>>, "several channels, lane by lane"},

@@ -18,7 +18,8 @@ FLOATS = {"REAL", "LREAL", "a real number"}
 COUNTS = {"UDINT", "UINT", "a whole number"}
 STARTS = {"BOOL": False, "REAL": 0.0, "LREAL": 0.0, "UINT": 0, "UDINT": 0}
 BITS = {"UINT": 16, "UDINT": 32}
-MATH = {"ABS": "abs", "SQRT": "root", "EXP": "math.exp", "EXPT": "math.pow"}
+MATH = {"ABS": "abs", "SQRT": "root", "EXP": "math.exp", "EXPT": "math.pow", "SIN": "sine",
+        "ATAN": "math.atan"}
 # Of all words of the language those that are likely in what is written.
 KEYWORDS = set("""IF THEN ELSIF ELSE END_IF FOR TO BY DO END_FOR WHILE END_WHILE REPEAT UNTIL EXIT
     CASE OF END_CASE RETURN TRUE FALSE AND OR XOR NOT MOD SEL VAR VAR_INPUT VAR_OUTPUT VAR_IN_OUT
@@ -68,6 +69,10 @@ def root(x):
     return math.sqrt(x) if x >= 0.0 else math.nan
 
 
+def sine(x):
+    return math.sin(x) if math.isfinite(x) else math.nan
+
+
 def counted(x, bits):
     assert 0 <= x < 1 << bits, "a count out of its range"
     return x
@@ -102,7 +107,7 @@ class Text:
         self.tokens, self.at = tokens(text), 0
         self.types, self.functions = {}, {}
         self.scope = {name: globals()[name] for name in (
-            "math", "clone", "rounded", "divided", "root", "counted")}
+            "math", "clone", "rounded", "divided", "root", "sine", "counted")}
         self.block = None
         while self.at < len(self.tokens):
             what = self.next()

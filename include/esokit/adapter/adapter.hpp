@@ -39,8 +39,9 @@ struct ExtensionOf<Observer> {
 template <LoopObserver Observer>
 class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Observer> {
   friend struct detail::GuardAccess;
+  friend struct detail::LaneAccess;
   static_assert(
-      PlainScalar<typename Observer::scalar_type>,
+      PlainScalar<typename Observer::scalar_type> || records<typename Observer::scalar_type>,
       "esokit: an adapter is of plain scalars; for packs: Packed<DelayedInput<..>, lanes>");
 
  public:
@@ -178,6 +179,8 @@ class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Ob
   /// @}
 
  protected:
+  static constexpr int data_members = 1;  // see LaneAccess
+
   /// Stores a copy.
   explicit constexpr Adapter(const Observer& observer) noexcept : observer_(observer) {}
 
@@ -191,7 +194,9 @@ class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Ob
 
 /// Base of the adapters with a config: `make`, `retune`, `adopt`, and members that most adapters
 /// forward. An adapter has `check(config)`, which returns a Check, a constructor from `(observer,
-/// config)`, and `take(fresh)`, which takes over its own settings.
+/// config)`, and `take(fresh)`, which takes over its own settings once the observer has taken over
+/// its own; or, if they may be refused, `take(fresh, before)`, which returns a Check and is called
+/// of a copy. `before` is the adapter with all its old settings.
 /// @tparam Self the adapter @tparam Settings its Config
 template <class Self, LoopObserver Observer, class Settings>
 class NamedAdapter : public Adapter<Observer> {
@@ -218,22 +223,34 @@ class NamedAdapter : public Adapter<Observer> {
 
   /// The same with the settings of `fresh`, as returned by `make`: without design work.
   Check<scalar_type> adopt(const Self& fresh) {
-    if (auto ok = this->observer_.adopt(fresh.observer_); !ok) return ok;
-    static_cast<Self&>(*this).take(fresh);
+    Self& self = static_cast<Self&>(*this);
+    if constexpr (requires { self.take(fresh, self); }) {
+      Self next = self;
+      if (auto ok = next.observer_.adopt(fresh.observer_); !ok) return ok;
+      if (auto ok = next.take(fresh, self); !ok) return ok;
+      self = next;
+    } else {
+      if (auto ok = self.observer_.adopt(fresh.observer_); !ok) return ok;
+      self.take(fresh);
+    }
     return {};
   }
 
   /// Time update only, see PredictorCorrector::predict.
-  StepStatus predict(scalar_type u_applied) noexcept { return this->observer_.predict(u_applied); }
+  StatusOf<scalar_type> predict(scalar_type u_applied) noexcept {
+    return this->observer_.predict(u_applied);
+  }
 
   /// Measurement update only, see PredictorCorrector::correct.
-  StepStatus correct(scalar_type y) noexcept { return this->observer_.correct(y); }
+  StatusOf<scalar_type> correct(scalar_type y) noexcept { return this->observer_.correct(y); }
 
   /// Restarts at (y, 0, .., 0).
-  StepStatus reset(scalar_type y) noexcept { return this->observer_.reset(y); }
+  StatusOf<scalar_type> reset(scalar_type y) noexcept { return this->observer_.reset(y); }
 
   /// Restarts at a given estimate, N x 1.
-  StepStatus reset(const Estimate& state) noexcept { return this->observer_.reset(state); }
+  StatusOf<scalar_type> reset(const Estimate& state) noexcept {
+    return this->observer_.reset(state);
+  }
 
  protected:
   using Base::Base;

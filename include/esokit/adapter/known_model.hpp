@@ -4,6 +4,7 @@
 #pragma once
 
 #include <esokit/adapter/adapter.hpp>
+#include <esokit/core/lanes.hpp>
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/type_tag.hpp>
 #include <esokit/core/unroll.hpp>
@@ -48,6 +49,12 @@ struct KnownModelConfig {
 ///
 /// The change of fbar within a step, O(T), remains in dhat. Because fbar is computed from the
 /// estimate, it is part of the error dynamics: omega_o should be well above the slopes of fbar.
+///
+/// Retuning keeps the estimate fbar + d, so u does not jump: d becomes what the new fbar does not
+/// explain.
+///
+/// A function that is generic in the scalar, `template <class E> auto operator()(const E& x) const
+/// noexcept` with `select` for branches, can be written in C by `to_c`, too.
 /// @tparam Model your function fbar(estimate)
 template <ShiftableDisturbance Observer, class Model>
 requires PlantModel<Model, Observer>
@@ -55,14 +62,22 @@ class KnownModel : public NamedAdapter<KnownModel<Observer, Model>, Observer,
                                        KnownModelConfig<Observer, Model>> {
   using Base = NamedAdapter<KnownModel, Observer, KnownModelConfig<Observer, Model>>;
   friend Base;
+  friend struct detail::LaneAccess;
+  friend struct detail::RecordAccess;
   using Base::observer_;
   using S = typename Observer::scalar_type;
+  using Status = StatusOf<S>;
   static_assert(!observer_traits<Observer>.delays_input,
                 "esokit: put DelayedInput around KnownModel, not inside it: fbar is not delayed");
 
  public:
   using Base::order;
   using typename Base::Estimate;
+
+  /// The same on a scalar that records, see `to_c`: packs of it run one by one.
+  template <class T>
+  requires(records<T>) using with_scalar =
+      KnownModel<detail::WithScalar<Observer, T>, typename detail::ForScalar<Model, T>::type>;
 
   /// What the adapter can do beyond LoopObserver.
   static constexpr ObserverTraits traits = [] {
@@ -73,53 +88,24 @@ class KnownModel : public NamedAdapter<KnownModel<Observer, Model>, Observer,
     return traits;
   }();
 
-  /// Takes over the settings of `fresh`, as returned by `make`, without design work. As with
-  /// `retune`, the estimate fbar + d is kept; d becomes the part that the new fbar does not
-  /// explain, and a change of b0 is moved into d as usual. u does not jump.
-  Check<S> adopt(const KnownModel& fresh) {
-    KnownModel next = *this;
-    const S fed = observer_.applied_input() - applied_input_;
-    const S gain_change = this->input_gain() - fresh.input_gain();
-    if (auto ok = next.observer_.adopt(fresh.observer_); !ok) return ok;
-    next.model_ = fresh.model_;
-    next.inverse_gain_ = fresh.inverse_gain_;
-    // The observer added (b0_old - b0_new) times its whole input to d; the share of fbar in this
-    // input must be taken out again.
-    const S moved = known_part() - next.known_part() - gain_change * fed;
-    const bool some = !is_finite(moved) || moved < S(0) || moved > S(0);
-    if (some && next.observer_.shift_disturbance(moved) != StepStatus::ok) {
-      return Error<S>{"model", moved, "would make the estimate not finite"};
-    }
-    *this = next;
-    return {};
-  }
-
   /// One sample, see PredictorCorrector::update. `u_applied` is the u that the actuator held,
   /// without the contribution of the model.
-  StepStatus update(S y, S u_applied) noexcept {
+  Status update(S y, S u_applied) noexcept {
     const S input = accepted(u_applied);
     return report(u_applied) | observer_.update(y, input);
   }
 
   /// Time update only, see PredictorCorrector::predict.
-  StepStatus predict(S u_applied) noexcept {
+  Status predict(S u_applied) noexcept {
     const S input = accepted(u_applied);
     return report(u_applied) | observer_.predict(input);
   }
 
-  /// Restarts at (y, 0, .., 0), with fbar + d zero.
-  StepStatus reset(S y) noexcept {
-    Estimate state = Estimate::Zero();
-    state(0) = y;
-    return observer_.reset(state);
-  }
+  /// Restarts at (y, 0, .., 0), with d zero, as after too long a gap.
+  Status reset(S y) noexcept { return observer_.reset(y); }
 
   /// Restarts at a given estimate, whose row n is fbar + d.
-  StepStatus reset(const Estimate& state) noexcept {
-    Estimate rest = state;
-    rest(order) = state(order) - model_(state);
-    return observer_.reset(rest);
-  }
+  Status reset(const Estimate& state) noexcept { return observer_.reset(without_known(state)); }
 
   /// (y, .., y^(n-1), fbar + d, d', .., d^(m-1)), N x 1, physical units.
   [[nodiscard]] Estimate estimate() const noexcept {
@@ -162,17 +148,34 @@ class KnownModel : public NamedAdapter<KnownModel<Observer, Model>, Observer,
   [[nodiscard]] S residual_disturbance() const noexcept { return observer_.total_disturbance(); }
 
   /// fbar.
-  [[nodiscard]] const Model& known_model() const noexcept { return model_; }
+  [[nodiscard]] const Model& known_model() const noexcept { return rest_.model; }
 
   /// fbar at the present estimate, unit of y^(n); zero if it, or fbar + dhat, is not finite.
   [[nodiscard]] S known_part() const noexcept { return known_part(observer_.estimate()); }
 
   /// The input that the last step used, without the contribution of the model.
-  [[nodiscard]] const S& applied_input() const noexcept { return applied_input_; }
+  [[nodiscard]] const S& applied_input() const noexcept { return rest_.applied_input; }
 
  private:
   KnownModel(const Observer& observer, const KnownModelConfig<Observer, Model>& config) noexcept
-      : Base(observer), model_(config.model), inverse_gain_(S(1) / observer.input_gain()) {}
+      : Base(observer), rest_{config.model, S(1) / observer.input_gain(), S(0)} {}
+
+  /// As with `retune`, the estimate fbar + d is kept; d becomes the part that the new fbar does not
+  /// explain, and a change of b0 is moved into d as usual. u does not jump.
+  Check<S> take(const KnownModel& fresh, const KnownModel& before) noexcept {
+    rest_.model = fresh.rest_.model;
+    rest_.inverse_gain = fresh.rest_.inverse_gain;
+    // The observer added (b0_old - b0_new) times its whole input to d; the share of fbar in this
+    // input must be taken out again.
+    const S fed = before.observer_.applied_input() - before.rest_.applied_input;
+    const S gain_change = before.input_gain() - fresh.input_gain();
+    const S moved = before.known_part() - known_part() - gain_change * fed;
+    const bool some = !is_finite(moved) || moved < S(0) || moved > S(0);
+    if (some && observer_.shift_disturbance(moved) != StepStatus::ok) {
+      return Error<S>{"model", moved, "would make the estimate not finite"};
+    }
+    return {};
+  }
 
   static Check<S> check(const KnownModelConfig<Observer, Model>& config) {
     if constexpr (detail::declared_traits<Model, PlantModelTraits>.checks) {
@@ -184,23 +187,34 @@ class KnownModel : public NamedAdapter<KnownModel<Observer, Model>, Observer,
 
   /// fbar at an estimate whose row n is dhat.
   [[nodiscard]] S known_part(const Estimate& state) const noexcept {
-    const S known = model_(state);
-    return is_finite(known + state(order)) ? known : S(0);
+    const S known = rest_.model(state);
+    return select(is_finite(S(known + state(order))), known, S(0.0));
+  }
+
+  /// An estimate of y, .., fbar + d as one of the rest.
+  [[nodiscard]] Estimate without_known(const Estimate& state) const noexcept {
+    Estimate rest = state;
+    rest(order) = state(order) - rest_.model(state);
+    return rest;
   }
 
   /// u, or the last good one, plus the contribution of the model.
   S accepted(const S& u) noexcept {
-    if (is_finite(u)) applied_input_ = u;
-    return applied_input_ + known_part() * inverse_gain_;
+    rest_.applied_input = select(is_finite(u), u, rest_.applied_input);
+    return rest_.applied_input + known_part() * rest_.inverse_gain;
   }
 
-  static StepStatus report(const S& u) noexcept {
-    return is_finite(u) ? StepStatus::ok : StepStatus::input_rejected;
+  static Status report(const S& u) noexcept {
+    return all(is_finite(u)) ? StepStatus::ok : StepStatus::input_rejected;
   }
 
-  Model model_;
-  S inverse_gain_;
-  S applied_input_{};
+  struct Rest {
+    static constexpr int data_members = 3;
+    [[no_unique_address]] Model model;
+    S inverse_gain;
+    S applied_input;
+  };
+  Rest rest_;
 };
 
 /// Distinguishes the type in snapshots.

@@ -7,7 +7,7 @@
 // Each layer calls the one below. Words with a dollar are filled in.
 namespace esokit::detail {
 
-/// Measured around it.
+/// Measured around it: what each w passes. Of several all its names have a number.
 inline constexpr const char* c_source_measured = R"(/* A measured disturbance w. */
 static bool takes_w($real w)
 {
@@ -43,7 +43,10 @@ static $real course_of_w(const $name_state *o, $real *passed)
   return mean;
 }
 
-static $real effect_of_w(const $name_state *o)
+)";
+/// What all of them do.
+inline constexpr const char* c_source_measured_effect =
+    R"(static $real effect_of_w(const $name_state *o)
 {
   $real passed = $ZERO;
   const $real mean = course_of_w(o, &passed);
@@ -56,7 +59,24 @@ static unsigned predict_measured($name_state *o, $real u)
   $real passed = $ZERO;
   $real now;
   $real more;
-  (void)course_of_w(o, &passed);
+)";
+inline constexpr const char* c_source_measured_effects =
+    R"(static $real effect_of_w(const $name_state *o)
+{
+  $real passed = $ZERO;
+  $real all = $ZERO;
+$W_ADD_ALL  return all;
+}
+
+static unsigned predict_measured($name_state *o, $real u)
+{
+  const unsigned status = predict_$below(o, u);
+  $real now;
+  $real more;
+$W_ADVANCE_ALL  o->w_is_new = 0u;
+)";
+/// A sample of a w.
+inline constexpr const char* c_source_measured_sample = R"(  (void)course_of_w(o, &passed);
   o->w_lagged = passed;
   if ((o->w_is_new != 0u) && takes_w(o->w_given)) {
     o->w_last = o->w_given;
@@ -66,10 +86,17 @@ static unsigned predict_measured($name_state *o, $real u)
   } else {
     /* It has been lost for long. */
   }
-  o->w_is_new = 0u;
-  o->newest_w = after_w(o->newest_w);
+$W_FORGET  o->newest_w = after_w(o->newest_w);
   o->w[o->newest_w] = (o->w_lost > $W_MOSTu) ? $ZERO : o->w_last;
-  now = effect_of_w(o);
+)";
+inline constexpr const char* c_source_measured_advance =
+    R"(static void advance_w($name_state *o)
+{
+  $real passed = $ZERO;
+$W_SAMPLE}
+
+)";
+inline constexpr const char* c_source_measured_tell = R"(  now = effect_of_w(o);
   more = now - o->w_told;
   if (((more < $ZERO) || (more > $ZERO)) && load(o, more)) {
     o->w_told = now;
@@ -77,10 +104,9 @@ static unsigned predict_measured($name_state *o, $real u)
   return status;
 }
 
-void $name_measured($name_state *o, $real w)
+void $name_measured($name_state *o, $W_ARGUMENT)
 {
-  o->w_given = $W_SIGNw;
-  o->w_is_new = 1u;
+$W_GIVE  o->w_is_new = 1u;
 }
 
 )";
@@ -103,7 +129,13 @@ static void settle_w($name_state *o)
     o->w[i] = w;
   }
   o->w_lagged = w;
-  o->w_told = effect_of_w(o);
+$W_TOLD}
+
+)";
+/// Of all of them.
+inline constexpr const char* c_source_measured_settle_all = R"(static void settle_w($name_state *o)
+{
+$W_SETTLE_ALL  o->w_told = effect_of_w(o);
 }
 
 )";
@@ -169,6 +201,30 @@ static unsigned update_gated($name_state *o, $real y, $real u)
 
 )";
 
+/// KnownModel around it.
+inline constexpr const char* c_source_known =
+    R"(/* The known part of the motion acts like a u of its own. */
+static $real push_known($name_state *o, $real u)
+{
+  $real driven = $ZERO;
+  (void)drive(o, u, &driven);
+  return driven;
+}
+
+static unsigned predict_known($name_state *o, $real u)
+{
+  const unsigned status = predict_$below(o, push_known(o, u));
+  return is_finite(u) ? status : (status | $NAME_INPUT_REJECTED);
+}
+
+static unsigned update_known($name_state *o, $real y, $real u)
+{
+  const unsigned status = update_$below(o, y, push_known(o, u));
+  return is_finite(u) ? status : (status | $NAME_INPUT_REJECTED);
+}
+
+)";
+
 /// DelayedInput around it.
 inline constexpr const char* c_source_delay = R"(static uint16_t after_delayed(uint16_t place)
 {
@@ -228,7 +284,7 @@ typedef struct {
   bool usable;
   bool fits; /* it moved as before */
   bool counted;
-} angle_reading;
+$READING_MORE} angle_reading;
 
 static $real wrapped($real angle)
 {
@@ -241,7 +297,7 @@ static bool can_be_told($real y)
   return is_finite(turns) && ($fabs(turns) < $MOST_TURNS);
 }
 
-static void forget_turns($name_state *o)
+static void $forget($count_state *o)
 {
   o->angle = $ZERO;
   o->turns = $ZERO;
@@ -252,16 +308,16 @@ static void forget_turns($name_state *o)
   o->begun = 0u;
 }
 
-static bool restart_wrapped($name_state *o, $real y)
+$FORGET_BOTHstatic bool restart_wrapped($name_state *o, $real y)
 {
   const bool good = can_be_told(y) && restart(o, wrapped(y));
   if (good) {
     forget_turns(o);
-  }
+$OPEN_GATE  }
   return good;
 }
 
-static $real expected_motion(const $name_state *o, uint32_t samples)
+static $real expected_motion(const $count_state *o, uint32_t samples)
 {
   $real motion = o->motion;
   if ((o->motion_samples == 65535u) || (samples == 0u)) {
@@ -274,9 +330,9 @@ static $real expected_motion(const $name_state *o, uint32_t samples)
   return motion;
 }
 
-static angle_reading read_angle(const $name_state *o, $real y, uint32_t samples)
+static angle_reading read_angle(const $count_state *o, $real y, uint32_t samples)
 {
-  angle_reading reading = {$ZERO, $ZERO, $ZERO, 0u, false, true, false};
+  angle_reading reading = {$ZERO, $ZERO, $ZERO, 0u, false, true, false$NONE_MORE};
   if (can_be_told(y)) {
     reading.usable = true;
     reading.y = wrapped(y);
@@ -308,12 +364,11 @@ static void recentre($name_state *o)
   if (!($fabs(z) <= $HALF)) {
     const $real turns = $round(z * $INVERSE);
     if (shift(o, -(turns * $PERIOD))) {
-      o->turns = o->turns - turns;
-    }
+$TURN_BACK    }
   }
 }
 
-static void learn_motion($name_state *o, const angle_reading *reading)
+static void learn_motion($count_state *o, const angle_reading *reading)
 {
   if ((o->begun != 0u) && (reading->samples != 0u)) {
     if (reading->samples > o->motion_samples) {
@@ -340,7 +395,9 @@ static unsigned restart_at_angle($name_state *o, $real y)
   return restart_wrapped(o, y) ? $NAME_RESTARTED : $NAME_MEASUREMENT_REJECTED;
 }
 
-/* After the correction. */
+)";
+/// What it keeps after a correction.
+inline constexpr const char* c_source_wrapped_keep = R"(/* After the correction. */
 static unsigned keep_angle($name_state *o, const angle_reading *reading, unsigned given)
 {
   unsigned status = given;
@@ -363,7 +420,91 @@ static unsigned keep_angle($name_state *o, const angle_reading *reading, unsigne
   return status;
 }
 
-static unsigned predict_wrapped($name_state *o, $real u)
+)";
+/// The same around a gate: turns are counted over all measurements, too, as those that the gate
+/// accepts are chosen by the estimate.
+inline constexpr const char* c_source_wrapped_gated =
+    R"(static void learn_turn($name_turns *o, const angle_reading *reading)
+{
+  learn_motion(o, reading);
+  o->angle = reading->y;
+  o->turns = reading->turns;
+  if (reading->fits) {
+    o->doubts = 0u;
+  } else if (o->doubts < 3u) {
+    o->doubts = (uint8_t)(o->doubts + 1u);
+  } else {
+    /* There are enough. */
+  }
+  o->begun = 1u;
+}
+
+static uint8_t one_more(uint8_t count)
+{
+  return (count < 255u) ? (uint8_t)(count + 1u) : count;
+}
+
+/* Where the gate rejects what moves steadily, the turn is that of all measurements. */
+static angle_reading choose_angle(const $name_state *o, $real y, uint32_t missed)
+{
+  angle_reading reading = read_angle(&o->taken, y, missed);
+  reading.missed = missed;
+  if ((o->heard_rejected > 0u) && (o->heard_steady >= 8u) &&
+      (o->heard_steady >= o->heard_rejected)) {
+    angle_reading heard = read_angle(&o->heard, y, missed - o->heard_at);
+    if (heard.fits && heard.counted) {
+      heard.missed = missed;
+      heard.heard = true;
+      reading = heard;
+    }
+  }
+  return reading;
+}
+
+static void hear_angle($name_state *o, const angle_reading *given)
+{
+  const angle_reading reading = read_angle(&o->heard, given->y, given->missed - o->heard_at);
+  const bool steady = reading.fits && (o->heard.motion_samples != 65535u);
+  o->heard_steady = steady ? one_more(o->heard_steady) : 0u;
+  o->heard_rejected = one_more(o->heard_rejected);
+  o->heard_at = (uint16_t)given->missed;
+  learn_turn(&o->heard, &reading);
+}
+
+/* After the correction. */
+static unsigned keep_angle($name_state *o, const angle_reading *reading, unsigned given)
+{
+  unsigned status = given;
+  if ((status & $NAME_MEASUREMENT_REJECTED) != 0u) { /* the state is to blame */
+    return restart_at_angle(o, reading->y) | (status & $NAME_INPUT_REJECTED);
+  }
+  if ((status & $NAME_OUTLIER_REJECTED) != 0u) {
+    hear_angle(o, reading);
+    recentre(o);
+    return status;
+  }
+  if (!reading->fits) {
+    status |= $NAME_TURN_ASSUMED;
+  }
+  if (!reading->heard) {
+    learn_turn(&o->taken, reading);
+  }
+  hear_angle(o, reading);
+  if (reading->heard) {
+    o->taken = o->heard;
+  } else {
+    o->heard.turns = o->taken.turns; /* counted from what was used */
+  }
+  o->heard_at = 0u;
+  o->heard_rejected = 0u;
+  recentre(o);
+  return status;
+}
+
+)";
+/// Its layer.
+inline constexpr const char* c_source_wrapped_layer =
+    R"(static unsigned predict_wrapped($name_state *o, $real u)
 {
   const unsigned status = predict_$below(o, u);
   recentre(o);
@@ -372,7 +513,7 @@ static unsigned predict_wrapped($name_state *o, $real u)
 
 static unsigned correct_wrapped($name_state *o, $real y)
 {
-  angle_reading reading = read_angle(o, y, o->gap);
+  angle_reading reading = $choose_angle(o, y, o->gap);
   if (!reading.usable) {
     return $NAME_MEASUREMENT_REJECTED;
   }
@@ -387,7 +528,7 @@ static unsigned correct_wrapped($name_state *o, $real y)
 
 static unsigned update_wrapped($name_state *o, $real y, $real u)
 {
-  const angle_reading reading = read_angle(o, y, (uint32_t)o->gap + 1u);
+  const angle_reading reading = $choose_angle(o, y, (uint32_t)o->gap + 1u);
   unsigned status;
   if (reading.counted) {
     status = update_$below(o, reading.y + (reading.turns * $PERIOD), u);

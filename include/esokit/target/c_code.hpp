@@ -71,6 +71,103 @@ inline Words c_common_words(const ListWriter& writer, const CodeOptions& options
           {"$COMMENT", options.comment.empty() ? "" : " * " + options.comment + "\n"}};
 }
 
+/// What is known is computed by functions of the C library, whose last bits are its own.
+inline std::string c_library_calls(const RecordedDesign& design) {
+  std::string names;
+  for (int at = 0; design.known.on && at < static_cast<int>(c_language.of.size()); ++at) {
+    const auto is_it = [at](const Instruction& one) {
+      return static_cast<int>(one.operation) == at;
+    };
+    const bool used = static_cast<int>(Operation::power) <= at &&
+                      at <= static_cast<int>(Operation::hyperbolic_tangent) &&
+                      std::any_of(design.calls.begin(), design.calls.end(), [&](const auto& call) {
+                        const auto& list = call.list.instructions;
+                        return std::any_of(list.begin(), list.end(), is_it);
+                      });
+    if (!used) continue;
+    const std::string call = c_language.of[static_cast<std::size_t>(at)];
+    names += (names.empty() ? ",\n * where the C library has the same " : ", ") +
+             call.substr(0, call.find('$')) + (design.single ? "f" : "");
+  }
+  return names;
+}
+
+/// Names and numbers of one measured disturbance: where there are several, w is w1, w2, ..
+inline Words c_words_of_w(const MeasuredNumbers& measured, std::size_t at,
+                          const ListWriter& writer) {
+  const MeasuredPathNumbers& path = measured.paths[at];
+  const auto pair = [&](const std::array<double, 2>& two) {
+    return writer.number(two[0]) + ", " + writer.number(two[1]);
+  };
+  Words words = {{"$W_GAIN", writer.number(path.gain)},
+                 {"$W_SHARE", pair(path.share)},
+                 {"$W_LATE", pair(path.late)},
+                 {"$W_REACHED", pair(path.reached)},
+                 {"$W_NEWESTu", std::to_string(path.memory.size() - 1) + "u"},
+                 {"$FOUR", writer.number(4 * static_cast<double>(measured.paths.size()))}};
+  if (measured.paths.size() > 1) {
+    const std::string w = "w" + std::to_string(at + 1);
+    for (const auto& [before, after] : {std::pair{"takes_", "("},
+                                        {"after_", "("},
+                                        {"course_of_", "("},
+                                        {"advance_", "("},
+                                        {"settle_", "("},
+                                        {"newest_", ""},
+                                        {"o->", "["},
+                                        {"", "_given"},
+                                        {"", "_last"},
+                                        {"", "_lagged"},
+                                        {"", "_lost"}}) {
+      const std::string begins = before;
+      words.emplace_back(begins + "w" + after, begins + w + after);
+    }
+  }
+  words.emplace_back("$RING", measured.paths.size() > 1 ? "w" + std::to_string(at + 1) : "w");
+  return words;
+}
+
+/// The texts around it. @param settles whether there is a start
+inline std::string c_measured(const RecordedDesign& design, const ListWriter& writer,
+                              bool settles) {
+  const MeasuredNumbers& measured = design.measured;
+  const bool one = measured.paths.size() == 1;
+  const std::string sign = design.error_based ? "-" : "";
+  std::string paths;
+  std::string give;
+  std::string add;
+  std::string advance;
+  std::string settle;
+  std::string settle_each;
+  Words words;
+  for (std::size_t at = 0; at < measured.paths.size(); ++at) {
+    words = c_words_of_w(measured, at, writer);
+    const std::string number = std::to_string(at + 1);
+    paths += filled(c_source_measured, words);
+    if (!one) {
+      paths += filled(filled(c_source_measured_advance, {{"$W_SAMPLE", c_source_measured_sample}}),
+                      words);
+      give += "  o->w" + number + "_given = " + sign + "w[" + std::to_string(at) + "];\n";
+      add += filled("  all = all + ($W_GAIN * course_of_w(o, &passed));\n", words);
+      advance += "  advance_w" + number + "(o);\n";
+      settle += "  settle_w" + number + "(o);\n";
+    }
+    settle_each += filled(c_source_measured_settle, words);
+  }
+  std::string text =
+      paths +
+      (one ? filled(std::string(c_source_measured_effect) + c_source_measured_sample, words)
+           : c_source_measured_effects) +
+      c_source_measured_tell;
+  if (settles) text += "$W_UPDATE" + settle_each + (one ? "" : c_source_measured_settle_all);
+  if (!settles) text += "$W_UPDATE";
+  return filled(text, {{"$W_FORGET", one ? "  o->w_is_new = 0u;\n" : ""},
+                       {"$W_TOLD", one ? "  o->w_told = effect_of_w(o);\n" : ""},
+                       {"$W_GIVE", one ? "  o->w_given = " + sign + "w;\n" : give},
+                       {"$W_ADD_ALL", add},
+                       {"$W_ADVANCE_ALL", advance},
+                       {"$W_SETTLE_ALL", settle}});
+}
+
 /// What the texts need of any design.
 inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
   const std::string real = writer.real();
@@ -109,39 +206,68 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
             "u;\n  o->gate_open = " + (gate.open ? "1u" : "0u") + ";\n";
   }
   const WrapNumbers& wrap = design.wrap;
+  const std::string of_turns =
+      "  " + real + " angle; /* the last y, within half a period of zero */\n  " + real +
+      " turns;\n  " + real + " motion; /* of y in motion_samples */\n" +
+      "  uint16_t motion_samples;\n  uint8_t gaps;\n  uint8_t doubts;\n  uint8_t begun;\n";
   if (wrap.period > 0) {
-    members += "  " + real + " angle; /* the last y, within half a period of zero */\n  " + real +
-               " turns;\n  " + real + " motion; /* of y in motion_samples */\n" +
-               "  uint16_t motion_samples;\n  uint8_t gaps;\n  uint8_t doubts;\n" +
-               "  uint8_t begun;\n";
-    init += "  o->angle = " + writer.number(wrap.y) +
-            ";\n  o->turns = " + writer.number(wrap.turns) +
-            ";\n  o->motion = " + writer.number(wrap.motion) +
-            ";\n  o->motion_samples = " + std::to_string(wrap.samples) +
-            "u;\n  o->gaps = " + std::to_string(wrap.gaps) +
-            "u;\n  o->doubts = " + std::to_string(wrap.doubts) +
-            "u;\n  o->begun = " + (wrap.begun ? "1u" : "0u") + ";\n";
+    const auto set = [&](const std::string& place, const TurnNumbers& count) {
+      init += place + "angle = " + writer.number(count.y) + ";\n" + place +
+              "turns = " + writer.number(count.turns) + ";\n" + place +
+              "motion = " + writer.number(count.motion) + ";\n" + place +
+              "motion_samples = " + std::to_string(count.samples) + "u;\n" + place +
+              "gaps = " + std::to_string(count.gaps) + "u;\n" + place +
+              "doubts = " + std::to_string(count.doubts) + "u;\n" + place +
+              "begun = " + (count.begun ? "1u" : "0u") + ";\n";
+    };
+    if (wrap.gated) {
+      members +=
+          "  $name_turns taken; /* by the gate */\n  $name_turns heard; /* rejected, too */\n" +
+          std::string(
+              "  uint16_t heard_at; /* samples since one was taken, at the last one */\n"
+              "  uint8_t heard_steady;\n  uint8_t heard_rejected;\n");
+      set("  o->taken.", wrap.count);
+      set("  o->heard.", wrap.heard);
+      init += "  o->heard_at = " + std::to_string(wrap.heard_at) +
+              "u;\n  o->heard_steady = " + std::to_string(wrap.heard_steady) +
+              "u;\n  o->heard_rejected = " + std::to_string(wrap.heard_rejected) + "u;\n";
+    } else {
+      members += of_turns;
+      set("  o->", wrap.count);
+    }
   }
   const MeasuredNumbers& measured = design.measured;
-  const auto pair = [&](const std::array<double, 2>& two) {
-    return writer.number(two[0]) + ", " + writer.number(two[1]);
-  };
-  const std::string newest_w = std::to_string(measured.on ? measured.memory.size() - 1 : 0) + "u";
   if (measured.on) {
-    members += "  " + real + " w[" + std::to_string(measured.memory.size()) +
-               "]; /* measured, a ring */\n  " + real + " w_given; /* by $name_measured */\n  " +
-               real + " w_last; /* the last good one */\n  " + real +
-               " w_lagged; /* behind dead time and lag */\n  " + real +
-               " w_told; /* its part of the disturbance */\n  uint32_t w_lost;\n" +
-               "  uint16_t newest_w;\n  uint8_t w_is_new;\n";
-    for (std::size_t i = 0; i < measured.memory.size(); ++i) {
-      init += "  o->w[" + std::to_string(i) + "] = " + writer.number(measured.memory[i]) + ";\n";
+    const bool one = measured.paths.size() == 1;
+    const std::string told =
+        "  " + real + " w_told; /* " + (one ? "its" : "their") + " part of the disturbance */\n";
+    const std::string set_told = "  o->w_told = " + writer.number(measured.told) + ";\n";
+    for (std::size_t w = 0; w < measured.paths.size(); ++w) {
+      const MeasuredPathNumbers& path = measured.paths[w];
+      std::string more = "  " + real + " $RING[" + std::to_string(path.memory.size()) +
+                         "]; /* measured, a ring */\n  " + real +
+                         " w_given; /* by $name_measured */\n  " + real +
+                         " w_last; /* the last good one */\n  " + real +
+                         " w_lagged; /* behind dead time and lag */\n" + (one ? told : "") +
+                         "  uint32_t w_lost;\n  uint16_t newest_w;\n";
+      std::string set;
+      for (std::size_t i = 0; i < path.memory.size(); ++i) {
+        set += "  o->w[" + std::to_string(i) + "] = " + writer.number(path.memory[i]) + ";\n";
+      }
+      set += "  o->w_given = $ZERO;\n  o->w_last = " + writer.number(path.last) +
+             ";\n  o->w_lagged = " + writer.number(path.lagged) + ";\n" + (one ? set_told : "") +
+             "  o->w_lost = " + std::to_string(path.lost) +
+             "u;\n  o->newest_w = " + std::to_string(path.memory.size() - 1) + "u;\n";
+      const Words numbered = c_words_of_w(measured, w, writer);
+      members += filled(more, numbered);
+      init += filled(set, numbered);
     }
-    init += "  o->w_given = $ZERO;\n  o->w_last = " + writer.number(measured.last) +
-            ";\n  o->w_lagged = " + writer.number(measured.lagged) +
-            ";\n  o->w_told = " + writer.number(measured.told) +
-            ";\n  o->w_lost = " + std::to_string(measured.lost) +
-            "u;\n  o->newest_w = " + newest_w + ";\n  o->w_is_new = 0u;\n";
+    if (!one) {
+      members += told;
+      init += set_told;
+    }
+    members += "  uint8_t w_is_new;\n";
+    init += "  o->w_is_new = 0u;\n";
   }
   const GuardNumbers& guard = design.guard;
   std::string found;
@@ -279,6 +405,7 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
       {"$BOOL", opens || guard.on ? "$include <stdbool.h>\n" : ""},
       {"$include", "#include"},  // not written in the texts: scripts look for such lines
       {"$MEMBERS", members},
+      {"$LIBRARY", c_library_calls(design)},
       {"$TIME", writer.number(design.sample_time)},
       {"$CORRECT", corrects},
       {"$KEEP_BOUND", bounds},
@@ -286,16 +413,12 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
        measured.on
            ? "/* w, measured, before the sample at which it begins to act; without it, or if "
              "it is not finite,\n * the last good one counts for $W_MOST samples, then zero. "
-             "*/\nvoid $name_measured($name_state *o, $real w);\n\n"
+             "*/\nvoid $name_measured($name_state *o, $W_ARGUMENT);\n\n"
            : ""},
-      {"$W_GAIN", writer.number(measured.gain)},
-      {"$W_SHARE", pair(measured.share)},
-      {"$W_LATE", pair(measured.late)},
-      {"$W_REACHED", pair(measured.reached)},
-      {"$W_NEWESTu", newest_w},
+      {"$W_ARGUMENT", measured.paths.size() > 1
+                          ? "const $real w[" + std::to_string(measured.paths.size()) + "]"
+                          : "$real w"},
       {"$W_MOST", std::to_string(measured.most_lost)},
-      {"$W_SIGN", design.error_based ? "-" : ""},
-      {"$FOUR", writer.number(4)},
       {"$SETTLE_W", measured.on && design.is_controller ? "  settle_w(o);\n" : ""},
       {"$OF_GUARD",
        guard.on ? "/* From the next correction on, those of the disturbance count so much, 0 .. 1. "
@@ -364,6 +487,28 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
       {"$STATES", std::to_string(design.size)},
       {"$STARTu", std::to_string(law.start) + "u"},
       {"$LEASTu", std::to_string(law.least_age) + "u"},
+      {"$TURNS", wrap.gated ? "/* The count of the turns of an angle. */\ntypedef struct {\n" +
+                                  of_turns + "} $name_turns;\n\n"
+                            : ""},
+      {"$count_state", wrap.gated ? "$name_turns" : "$name_state"},
+      {"$forget", wrap.gated ? "forget_count" : "forget_turns"},
+      {"$choose_angle", wrap.gated ? "choose_angle" : "read_angle"},
+      {"$READING_MORE",
+       wrap.gated
+           ? "  uint32_t missed; /* samples since one was taken */\n  bool heard; /* its turn is "
+             "counted from rejected ones, too */\n"
+           : ""},
+      {"$NONE_MORE", wrap.gated ? ", 0u, false" : ""},
+      {"$FORGET_BOTH",
+       wrap.gated ? "static void forget_turns($name_state *o)\n{\n  forget_count(&o->taken);\n  "
+                    "forget_count(&o->heard);\n  o->heard_at = 0u;\n  o->heard_steady = 0u;\n  "
+                    "o->heard_rejected = 0u;\n}\n\n"
+                  : ""},
+      {"$OPEN_GATE", wrap.gated && gated ? "    gate_set(o, true);\n" : ""},
+      {"$TURN_BACK", wrap.gated
+                         ? "      o->taken.turns = o->taken.turns - turns;\n      o->heard.turns = "
+                           "o->heard.turns - turns;\n"
+                         : "      o->turns = o->turns - turns;\n"},
       {"$PERIOD", writer.number(wrap.period)},
       {"$INVERSE", writer.number(wrap.inverse_period)},
       {"$HALF", writer.number(wrap.period * 0.5)},
@@ -409,19 +554,16 @@ inline Words c_loop_words(const RecordedDesign& design, const ListWriter& writer
     return "  if (" + condition + ") {\n    " + then + ";\n  }\n";
   };
   const std::string& angle = design.wrap.angle;
-  std::string call_law =
-      "    (void)law(o, " + (angle.empty() ? "r" : "wrapped(r - o->" + angle + ")") + ", &u);\n";
-  if (design.law.kind == RunningLaw::schedule) {
-    std::string estimates;
-    for (int row = 0; row < design.size; ++row) {
-      estimates += ", $name_estimate(o, " + std::to_string(row) + "u)";
-    }
-    const bool wraps = design.wrap.period > 0 && !design.error_based && !design.compensates;
-    const std::string first = "$name_estimate(o, 0u)";
-    call_law = "    (void)law(o, " +
-               (wraps ? first + " + wrapped(r - " + first + ")" : std::string("r")) + estimates +
-               ", &u);\n";
+  const bool wraps = design.wrap.period > 0 && !design.error_based && !design.compensates;
+  const std::string reference = !angle.empty() ? "wrapped(r - o->" + angle + ")"
+                                : wraps
+                                    ? "$name_estimate(o, 0u) + wrapped(r - $name_estimate(o, 0u))"
+                                    : "r";
+  std::string estimates;
+  for (int row = 0; design.law.kind == RunningLaw::schedule && row < design.size; ++row) {
+    estimates += ", $name_estimate(o, " + std::to_string(row) + "u)";
   }
+  std::string call_law = "    (void)law(o, " + reference + estimates + ", &u);\n";
   const bool guards = design.guard.on;
   if (guards && design.compensates) {
     call_law = "    (void)law(o, -$ZERO, &u);\n    u = r + (u * o->input_factor);\n";
@@ -436,16 +578,20 @@ inline Words c_loop_words(const RecordedDesign& design, const ListWriter& writer
                                                           " .. " + writer.number(design.upper)},
       {"$REFERENCE",
        design.compensates ? "the u0 of the controller that is helped" : "the reference"},
+      // In a function of its own where two call it: MISRA 8.7.
+      {"$OWN_MISS", divides ? std::string("static $real miss($name_state *o, $real r)\n{\n") +
+                                  c_source_miss + "}\n\n"
+                            : ""},
+      {"$TO_MISS", divides ? "  return miss(o, r);\n" : c_source_miss},
       {"$PHASE_MEMBER", divides ? "  uint16_t phase; /* a measurement is due at 0 */\n" : ""},
       {"$PHASE_INIT", divides ? "  o->phase = 0u;\n" : ""},
       {"$PHASE_NEXT", divides ? "  o->phase = (uint16_t)(o->phase + 1u);\n" +
                                     only("o->phase >= $DIVIDERu", "o->phase = 0u")
                               : ""},
-      {"$PHASE_BEFORE",
-       divides ? "  const bool planned = o->gap == $DUEu;\n" +
-                     only("o->phase != 0u", "return $name_update_without_measurement(o, r)") +
-                     "  o->phase = 1u;\n"
-               : ""},
+      {"$PHASE_BEFORE", divides
+                            ? "  const bool planned = o->gap == $DUEu;\n" +
+                                  only("o->phase != 0u", "return miss(o, r)") + "  o->phase = 1u;\n"
+                            : ""},
       {"$PHASE_PLAN", divides ? "  const bool planned = o->gap == $DUEu;\n" : ""},
       {"$PHASE_SKIP",
        divides ? "  if (o->phase != 0u) {\n    o->phase = (uint16_t)(o->phase + 1u);\n    if "
@@ -459,7 +605,9 @@ inline Words c_loop_words(const RecordedDesign& design, const ListWriter& writer
       {"$REST", design.gate.threshold > 0
                     ? "if ($rest(o, $MEASURED, $U_APPLIED)) {\n      gate_set(o, true);\n    }"
                     : "(void)$rest(o, $MEASURED, $U_APPLIED);"},
-      {"$U_APPLIED", guards ? "applied_by_present(o)" : "o->u_applied"},
+      {"$U_APPLIED", guards            ? "applied_by_present(o)"
+                     : design.known.on ? "o->u_given"
+                                       : "o->u_applied"},
       {"$ASKED", design.options.watched ? "  o->u_asked = o->u_last;\n" : ""},
       {"$CALL_LAW", call_law},
       {"$MEASURED", design.error_based ? "r - y" : "y"},
@@ -535,9 +683,10 @@ inline CCode c_texts(const RecordedDesign& design, const std::string& mark) {
   }
   const bool measures = design.measured.on;
   if (measures) {
-    add(c_source_measured);
-    if (!gated && !design.law.watches) add(c_source_measured_update);
-    if (controls) add(c_source_measured_settle);
+    const bool updates = !gated && !design.law.watches;
+    add(filled(c_measured(design, writer, controls),
+               {{"$W_UPDATE", updates ? c_source_measured_update : ""}})
+            .c_str());
     predict = "measured";
   }
   if (design.law.watches) {
@@ -558,12 +707,18 @@ inline CCode c_texts(const RecordedDesign& design, const std::string& mark) {
   }
   if (wraps) {
     add(c_source_wrapped);
+    layers += design.wrap.gated ? c_source_wrapped_gated : c_source_wrapped_keep;
+    add(c_source_wrapped_layer);
     predict = correct = update = "wrapped";
     restart = "restart_wrapped";
   }
   if (controls && (wraps || runs)) {
     layers += wraps ? c_source_wrapped_rest : c_source_running_rest;
     rest = wraps ? "rest_wrapped" : "rest_running";
+  }
+  if (design.known.on) {
+    add(c_source_known);
+    predict = update = "known";
   }
   if (!design.line.empty()) {
     add(c_source_delay);
@@ -659,11 +814,19 @@ inline CCode c_code(const RecordedDesign& design) {
 /// Written are LinearEso, also with a set of poles, HalfGainEso, ReducedOrderEso, CascadeEso,
 /// AdjustableBandwidthEso, NonlinearEso, ModelEso, PlantEso and their cascades (not with
 /// `follows_speed`), AlgebraicEso, ExtendedStateFilter (in its modes recursive and frozen, without
-/// a nominal model), these in DelayedInput and OutlierGate or WrappedOutput, in Measured with one
-/// disturbance (around no WrappedOutput, but inside it, and not in Guarded), LinearEso and
-/// CascadeEso in Guarded, too (a changing b0 unless the law softens), and Adrc of
-/// both forms and DisturbanceCompensator around them, and PredictiveAdrc around one of a single
-/// level with constant gains and no sensor in its model, without an adapter. Others do not compile.
+/// a nominal model), these in DelayedInput, OutlierGate and WrappedOutput, in KnownModel if its
+/// function is generic (not AlgebraicEso), in Measured (not around WrappedOutput or another
+/// Measured, and not in Guarded), LinearEso and CascadeEso in Guarded, too (a changing b0 unless
+/// the law softens), Adrc of both forms and DisturbanceCompensator around them, and PredictiveAdrc
+/// around one of a single level with constant gains and no sensor in its model, without an adapter.
+/// Others do not compile.
+///
+/// The function of a KnownModel is recorded like all else, with its own numbers as constants: it is
+/// `template <class E> auto operator()(const E& x) const noexcept`, or a template of the scalar
+/// with `with_scalar`. It adds, multiplies and compares numbers of the observer's scalar (and
+/// integers), and calls abs, sqrt, pow, exp, expm1, sin, cos, tan, atan and tanh as by `using
+/// std::sin;`. A branch on a value does not compile: `select(condition, a, b)` chooses.
+///
 /// SmoothProfile and HealthMonitor: target/profile_code.hpp and target/health_code.hpp.
 /// @param object as `make` returned it: its state is that of `init`
 /// @return error for a name that is no identifier, a comment that would end the one it stands in, a
@@ -680,12 +843,15 @@ Expected<CCode, Error<typename Object::scalar_type>> to_c(const Object& object,
 /// What cannot be written yet, by name.
 template <class Other>
 void to_c(const Other&, const CodeOptions& = {}) {
+  static_assert(detail::knows_in_general<Other>,
+                "esokit: to_c records the function of a KnownModel: it has to be generic, template "
+                "<class E> auto operator()(const E& x) const noexcept");
   static_assert(
-      detail::Writable<Other>,
+      !detail::knows_in_general<Other> || detail::Writable<Other>,
       "esokit: to_c writes LinearEso, HalfGainEso, ReducedOrderEso, CascadeEso, "
       "AdjustableBandwidthEso, NonlinearEso, ModelEso, PlantEso, AlgebraicEso and "
-      "ExtendedStateFilter, these in DelayedInput and OutlierGate or WrappedOutput, in Measured "
-      "with one disturbance, on the chain with one extended state in Guarded, and "
+      "ExtendedStateFilter, these in DelayedInput, OutlierGate, WrappedOutput and Measured, in "
+      "KnownModel (not AlgebraicEso), on the chain with one extended state in Guarded, and "
       "Adrc and DisturbanceCompensator around them, and PredictiveAdrc around one with constant "
       "gains; no other gains, adapters or controllers yet");
 }

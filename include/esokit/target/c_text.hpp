@@ -14,7 +14,7 @@ inline constexpr const char* c_header_head = R"(#ifndef $NAME_H
 /* Written by esokit from a finished design; do not edit.
 $COMMENT * T = $TIME s, b0 = $GAIN$LIMITS.
  *
- * Compile with -std=c99 or -ffp-contract=off: then it equals the C++ bit for bit. */
+ * Compile with -std=c99 or -ffp-contract=off: then it equals the C++ bit for bit$LIBRARY. */
 
 $BOOL$include <stdint.h>
 
@@ -70,7 +70,7 @@ inline constexpr const char* c_header_controller = R"(/* `mode`: what determines
 #define $NAME_START_HOLD 1u
 #define $NAME_SAFE 2u /* too many measurements are missing */
 
-typedef struct {
+$TURNStypedef struct {
 $MEMBERS$PHASE_MEMBER  uint32_t hold_left; /* samples of the start hold */
   uint16_t gap; /* samples since the last measurement that was taken */
   uint8_t mode;
@@ -258,7 +258,7 @@ unsigned $name_applied($name_state *o, $real u)
 )";
 
 /// The header of an observer.
-inline constexpr const char* c_header_observer = R"(typedef struct {
+inline constexpr const char* c_header_observer = R"($TURNStypedef struct {
 $MEMBERS  uint16_t gap; /* samples since the last measurement that was taken */
 } $name_state;
 
@@ -632,7 +632,7 @@ $HARDEN$GATE_START  o->gap = 0u;
   return 0u;
 }
 
-$real $name_update($name_state *o, $real y, $real r)
+$OWN_MISS$real $name_update($name_state *o, $real y, $real r)
 {
   unsigned status;
 $PHASE_BEFORE  status = update_$top(o, $MEASURED, o->u_last);
@@ -646,16 +646,20 @@ $PHASE_AFTER  o->status = (uint8_t)status;
 
 $real $name_update_without_measurement($name_state *o, $real r)
 {
-$PHASE_NEXT  o->status = (uint8_t)predict_$top(o, o->u_last);
-  judge_missing(o);
-  return put_out(o, r);
-}
+$TO_MISS}
 
 void $name_applied($name_state *o, $real u)
 {
   (void)applied(o, u);
 }
 
+)";
+
+/// A sample without a measurement.
+inline constexpr const char* c_source_miss =
+    R"($PHASE_NEXT  o->status = (uint8_t)predict_$top(o, o->u_last);
+  judge_missing(o);
+  return put_out(o, r);
 )";
 
 /// Compares with samples of the design.

@@ -440,8 +440,11 @@ class FixedDesign {
                     "is in Guarded, which is not written in fixed point");
     }
     if (design_->measured.on) {
-      return refuse("observer", design_->measured.gain,
+      return refuse("observer", design_->measured.paths[0].gain,
                     "is in Measured, which is not written in fixed point");
+    }
+    if (design_->known.on) {
+      return refuse("observer", 0, "is in KnownModel, which is not written in fixed point");
     }
     if (design_->law.kind != RunningLaw::none && !design_->law.settled) {
       return refuse("observer", static_cast<double>(design_->law.age),

@@ -31,33 +31,18 @@ struct Language {
   const char* real[2];             ///< double, float
   const char* number_suffix[2];    ///< of a constant
   const char* from_state;          ///< before the name of a number of the object
-  std::array<const char*, 21> of;  ///< each Operation
+  std::array<const char*, 26> of;  ///< each Operation
 };
 
-inline constexpr Language c_language{{"double", "float"},
-                                     {"", "f"},
-                                     "o->",
-                                     {"",
-                                      "",
-                                      "$a + $b",
-                                      "$a - $b",
-                                      "$a * $b",
-                                      "$a / $b",
-                                      "-$a",
-                                      "fabs$f($a)",
-                                      "sqrt$f($a)",
-                                      "pow$f($a, $b)",
-                                      "exp$f($a)",
-                                      "expm1$f($a)",
-                                      "$a ? $b : $c",
-                                      "$a < $b",
-                                      "$a > $b",
-                                      "$a <= $b",
-                                      "$a >= $b",
-                                      "is_finite($a)",
-                                      "$a && $b",
-                                      "$a || $b",
-                                      "!$a"}};
+inline constexpr Language c_language{
+    {"double", "float"},
+    {"", "f"},
+    "o->",
+    {"",          "",           "$a + $b",    "$a - $b",       "$a * $b",       "$a / $b",
+     "-$a",       "fabs$f($a)", "sqrt$f($a)", "pow$f($a, $b)", "exp$f($a)",     "expm1$f($a)",
+     "sin$f($a)", "cos$f($a)",  "tan$f($a)",  "atan$f($a)",    "tanh$f($a)",    "$a ? $b : $c",
+     "$a < $b",   "$a > $b",    "$a <= $b",   "$a >= $b",      "is_finite($a)", "$a && $b",
+     "$a || $b",  "!$a"}};
 
 /// A recorded call with names.
 struct NamedCall {

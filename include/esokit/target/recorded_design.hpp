@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/guarded.hpp>
+#include <esokit/adapter/known_model.hpp>
 #include <esokit/adapter/measured.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
@@ -86,11 +87,8 @@ struct LawNumbers {
   bool watches = false;    ///< whether it refuses outliers
 };
 
-/// A WrappedOutput.
-struct WrapNumbers {
-  double period = 0;  ///< 0: there is none
-  double inverse_period = 0;
-  double most_turns = 0;  ///< more cannot be told apart
+/// Its count of turns.
+struct TurnNumbers {
   double y = 0;
   double turns = 0;
   double motion = 0;
@@ -98,6 +96,19 @@ struct WrapNumbers {
   unsigned gaps = 0;
   unsigned doubts = 0;
   bool begun = false;
+};
+
+/// A WrappedOutput.
+struct WrapNumbers {
+  double period = 0;  ///< 0: there is none
+  double inverse_period = 0;
+  double most_turns = 0;  ///< more cannot be told apart
+  TurnNumbers count{};
+  bool gated = false;  ///< around a gate: the rest counts over all measurements
+  TurnNumbers heard{};
+  unsigned heard_at = 0;
+  unsigned heard_steady = 0;
+  unsigned heard_rejected = 0;
   std::string angle{};  ///< the estimate that the law subtracts from the reference
 };
 
@@ -129,19 +140,30 @@ struct GuardNumbers {
   bool frozen = false;
 };
 
-/// A Measured of one disturbance.
-struct MeasuredNumbers {
-  bool on = false;
+/// One of the disturbances of a Measured.
+struct MeasuredPathNumbers {
   double gain = 0;
   std::array<double, 2> share{};  ///< of a sample in which the older and the newer w arrive,
   std::array<double, 2> late{};   ///< and what the lag does in these
   std::array<double, 2> reached{};
-  unsigned most_lost = 0;
   std::vector<double> memory{};  ///< the newest last
   double lagged = 0;
   double last = 0;
-  double told = 0;
   unsigned lost = 0;
+};
+
+/// A Measured.
+struct MeasuredNumbers {
+  bool on = false;
+  unsigned most_lost = 0;
+  double told = 0;
+  std::vector<MeasuredPathNumbers> paths{};
+};
+
+/// A KnownModel.
+struct KnownNumbers {
+  bool on = false;
+  bool around_angle = false;  ///< a WrappedOutput is inside
 };
 
 /// A finished design as lists and counts, without its type.
@@ -168,6 +190,7 @@ struct RecordedDesign {
   WrapNumbers wrap{};
   GuardNumbers guard{};
   MeasuredNumbers measured{};
+  KnownNumbers known{};
   int max_gap = 0;  ///< missing samples that are bridged
   LoopRules loop{};
   double lower = 0;
@@ -241,7 +264,7 @@ struct RecordAccess {
         take(c.weights_, "law");
       }
       if constexpr (requires { c.gain_; }) take(c.gain_, "law");
-      find_settings(c.observer(), found);
+      find_settings(core(c.observer()), found);
     } else if constexpr (requires { c.laws_; }) {
       for (auto& law : c.laws_) take(law, "gain");
     }
@@ -349,12 +372,48 @@ struct RecordAccess {
   template <class O>
   using LawOf = std::remove_cvref_t<decltype(std::declval<O&>().laws_[0])>;
 
+  // ---- A known model.
+
+  template <class O>
+  static constexpr bool knows = requires(O& o) {
+    o.rest_.inverse_gain;
+  };
+  /// The observer in a KnownModel, or the object itself.
+  template <class O>
+  static auto& core(O& o) noexcept {
+    if constexpr (knows<O>) {
+      return o.observer_;
+    } else {
+      return o;
+    }
+  }
+  /// The input of the observer in it for a u.
+  template <class O, class S>
+  static S driven(O& o, const S& u) noexcept {
+    return o.accepted(u);
+  }
+  /// At rest at y under u: `at` is y, u and, of an angle, y without whole turns. @param
+  /// around_angle see KnownNumbers
+  template <class O, class Numbers>
+  static void rest(O& o, const Numbers& at, [[maybe_unused]] bool around_angle) noexcept {
+    auto state = o.equilibrium(at[0], at[1]);
+    const bool wraps = at.size() > 2;
+    if constexpr (knows<O>) {
+      if (wraps && !around_angle) state(0) = at[2];
+      state = o.without_known(state);
+    }
+    if (wraps) state(0) = at[2];
+    (void)core(o).reset(state);
+  }
+
   /// The law stands: no call moves it.
   template <class O>
-  static O& at_rest(O& o) noexcept {
-    if constexpr (kind_of<LawOf<O>> == RunningLaw::schedule) o.laws_[0].settled_ = true;
-    if constexpr (kind_of<LawOf<O>> == RunningLaw::filter) o.laws_[0].since_ = std::int8_t{9};
-    return o;
+  static O& at_rest(O& any) noexcept {
+    auto& o = core(any);
+    using Law = LawOf<std::remove_cvref_t<decltype(o)>>;
+    if constexpr (kind_of<Law> == RunningLaw::schedule) o.laws_[0].settled_ = true;
+    if constexpr (kind_of<Law> == RunningLaw::filter) o.laws_[0].since_ = std::int8_t{9};
+    return any;
   }
   template <class O>
   static LawNumbers law_numbers(const O& o) noexcept {
@@ -394,8 +453,9 @@ struct RecordAccess {
         law.bracket_ = S(0.0);
         return nothing;
       });
-      add("anchor_take", {"power", "contraction"}, false,
-          [=](Law& law, const auto& in) { return law.anchor_take(in[0], in[1]), nothing; });
+      add("anchor_take", {"power", "contraction"}, false, [=](Law& law, const auto& in) {
+        return Law::anchor_take(law.power_, law.bracket_, in[0], in[1]), nothing;
+      });
       add("anchor_contraction", {"power", "contraction"}, true,
           [](Law&, const auto& in) { return S(in[1] + in[0] * in[1]); });
       add("anchor_power", {"power", "contraction"}, true,
@@ -493,13 +553,18 @@ struct RecordAccess {
     wrap.period = number(o.period_);
     wrap.inverse_period = number(o.inverse_period_);
     wrap.most_turns = number(S(1) / (S(8) * rounding<S>()));
-    wrap.y = number(o.count_.y);
-    wrap.turns = number(o.count_.turns);
-    wrap.motion = number(o.count_.motion);
-    wrap.samples = o.count_.samples;
-    wrap.gaps = o.count_.gaps;
-    wrap.doubts = o.count_.doubts;
-    wrap.begun = o.count_.begun;
+    const auto counted = [&](const auto& c) {
+      return TurnNumbers{number(c.y), number(c.turns), number(c.motion), c.samples,
+                         c.gaps,      c.doubts,        c.begun};
+    };
+    wrap.count = counted(o.count_);
+    if constexpr (O::gated) {
+      wrap.gated = true;
+      wrap.heard = counted(o.heard_.count);
+      wrap.heard_at = o.heard_.at;
+      wrap.heard_steady = o.heard_.steady;
+      wrap.heard_rejected = o.heard_.rejected;
+    }
     return wrap;
   }
 
@@ -516,33 +581,35 @@ struct RecordAccess {
   static GuardNumbers guard(const O& o) noexcept {
     using S = typename O::scalar_type;
     const bool bounds = o.limit_ < (std::numeric_limits<S>::max)();
+    const auto& set = o.set_;
+    const auto& now = o.weights_;
     const auto number = [](const S& x) { return static_cast<double>(x); };
     return {true,
             O::levels,
             bounds ? number(o.limit_) : 0.0,
-            number(o.leak_),
-            number(o.trust_),
-            number(o.bound_),
-            o.unit_ == DisturbanceUnit::input,
+            number(set.leak),
+            number(now.trust),
+            number(set.bound),
+            set.unit == DisturbanceUnit::input,
             number(o.configured_gain()),
-            number(o.inverse_gain_),
+            number(set.inverse_gain),
             number(o.gain_ratio_),
             number(o.told_ratio_),
             number(o.input_factor_),
-            number(o.weight_up_),
-            number(o.weight_down_),
-            o.release_samples_,
-            o.release_left_,
-            static_cast<unsigned>(o.settling_samples_),
-            static_cast<unsigned>(o.settling_left_),
-            static_cast<unsigned>(o.pin_),
-            o.side_ > 0   ? 1u
-            : o.side_ < 0 ? 2u
-                          : 0u,
-            o.held_,
-            o.unsettled_,
-            o.gated_,
-            o.frozen_};
+            number(now.up),
+            number(now.down),
+            set.release_samples,
+            now.release_left,
+            static_cast<unsigned>(set.settling_samples),
+            static_cast<unsigned>(now.settling_left),
+            static_cast<unsigned>(now.pin),
+            now.side > 0   ? 1u
+            : now.side < 0 ? 2u
+                           : 0u,
+            now.held,
+            now.unsettled,
+            now.gated,
+            now.frozen};
   }
 
   /// What Guarded does with the states on the chain: y of a prediction, a plant that stands at y
@@ -598,25 +665,26 @@ struct RecordAccess {
   struct Empty {};
   template <class O>
   static MeasuredNumbers measured(const O& o) {
-    MeasuredNumbers numbers;
-    const auto& path = o.paths_[0];
     const auto number = [](const auto& x) { return static_cast<double>(x); };
-    numbers.on = true;
-    numbers.gain = number(path.input_.gain);
-    for (std::size_t i = 0; i < 2; ++i) {
-      numbers.share[i] = number(path.share_[i]);
-      numbers.late[i] = number(path.late_[i]);
-      numbers.reached[i] = number(path.reached_[i]);
+    MeasuredNumbers all{true, static_cast<unsigned>(o.most_lost_), number(o.told_), {}};
+    for (std::size_t w = 0; w < o.paths_.size(); ++w) {
+      const auto& path = o.paths_[w];
+      MeasuredPathNumbers numbers;
+      numbers.gain = number(path.input_.gain);
+      for (std::size_t i = 0; i < 2; ++i) {
+        numbers.share[i] = number(path.share_[i]);
+        numbers.late[i] = number(path.late_[i]);
+        numbers.reached[i] = number(path.reached_[i]);
+      }
+      for (int age = path.whole_ + 1; age >= 0; --age) {
+        numbers.memory.push_back(number(path.before(age)));
+      }
+      numbers.lagged = number(path.lagged_);
+      numbers.last = number(o.last_[w]);
+      numbers.lost = static_cast<unsigned>(o.lost_[w]);
+      all.paths.push_back(numbers);
     }
-    numbers.most_lost = static_cast<unsigned>(o.most_lost_);
-    for (int age = path.whole_ + 1; age >= 0; --age) {
-      numbers.memory.push_back(number(path.before(age)));
-    }
-    numbers.lagged = number(path.lagged_);
-    numbers.last = number(o.last_[0]);
-    numbers.told = number(o.told_);
-    numbers.lost = static_cast<unsigned>(o.lost_[0]);
-    return numbers;
+    return all;
   }
 
   /// What a monitor computes from its settings alone, and of the controller that it watches.
@@ -714,36 +782,28 @@ struct IsMeasured : std::false_type {};
 template <class Observer, int Count, int Delay>
 struct IsMeasured<Measured<Observer, Count, Delay>> : std::true_type {};
 template <class Observer>
+struct IsKnown : std::false_type {};
+template <class Observer, class Model>
+struct IsKnown<KnownModel<Observer, Model>> : std::true_type {};
+template <class Observer>
 inline constexpr bool is_adapter =
     IsDelayed<Observer>::value || IsGate<Observer>::value || IsWrapped<Observer>::value ||
     IsGuarded<Observer>::value || IsMeasured<Observer>::value;
-/// One disturbance, told once and inside a WrappedOutput: around it the angle is read otherwise.
+/// Told at one place, and inside a WrappedOutput: around it the angle is read otherwise.
 template <class Observer>
 inline constexpr bool measures_plainly = [] {
   if constexpr (IsMeasured<Observer>::value) {
     using Inside = typename Observer::Adapted;
-    return Observer::inputs == 1 && !observer_traits<Inside>.takes_measured &&
-           !observer_traits<Inside>.wraps_output && measures_plainly<Inside>;
+    return !observer_traits<Inside>.takes_measured && !observer_traits<Inside>.wraps_output &&
+           measures_plainly<Inside>;
   } else if constexpr (IsGuarded<Observer>::value) {
     return !observer_traits<typename Observer::Adapted>.takes_measured;
-  } else if constexpr (is_adapter<Observer>) {
+  } else if constexpr (is_adapter<Observer> || IsKnown<Observer>::value) {
     return measures_plainly<typename Observer::Adapted>;
   } else {
     return true;
   }
 }();
-/// With a gate in it a WrappedOutput counts twice.
-template <class Observer>
-inline constexpr bool wraps_beside_gate = [] {
-  if constexpr (IsWrapped<Observer>::value) {
-    return observer_traits<typename Observer::Adapted>.rejects_outliers;
-  } else if constexpr (is_adapter<Observer>) {
-    return wraps_beside_gate<typename Observer::Adapted>;
-  } else {
-    return false;
-  }
-}();
-
 /// What the adapters around an observer count and choose.
 template <class Observer>
 void take_adapters(RecordedDesign& design, const Observer& observer) {
@@ -752,7 +812,11 @@ void take_adapters(RecordedDesign& design, const Observer& observer) {
   if constexpr (IsGuarded<Observer>::value) design.guard = RecordAccess::guard(observer);
   if constexpr (IsWrapped<Observer>::value) design.wrap = RecordAccess::wrap(observer);
   if constexpr (IsMeasured<Observer>::value) design.measured = RecordAccess::measured(observer);
-  if constexpr (is_adapter<Observer>) take_adapters(design, observer.observer());
+  if constexpr (IsKnown<Observer>::value) {
+    design.known = {true, observer_traits<typename Observer::Adapted>.wraps_output};
+  }
+  if constexpr (is_adapter<Observer> || IsKnown<Observer>::value)
+    take_adapters(design, observer.observer());
 }
 
 /// An observer without the adapter around it, and a controller around the observer without it.
@@ -780,6 +844,11 @@ struct WithoutAdapter<Guarded<Observer>> {
 template <class Observer, int Count, int Delay>
 struct WithoutAdapter<Measured<Observer, Count, Delay>> {
   using type = typename WithoutAdapter<Observer>::type;
+};
+/// What is known is recorded with the observer.
+template <class Observer, class Model>
+struct WithoutAdapter<KnownModel<Observer, Model>> {
+  using type = KnownModel<typename WithoutAdapter<Observer>::type, Model>;
 };
 template <class Observer, class Form>
 struct WithoutAdapter<Adrc<Observer, Form>> {
@@ -816,19 +885,42 @@ template <class Law>
 concept GapGainsAreATable = gain_law_traits<Law>
 .bridges_gaps && !gain_law_traits<Law>.advances && requires { typename WithScalar<Law, float>; };
 
-/// An observer whose lists are recorded: PredictorCorrector with such laws, or with one that runs.
 template <class Observer>
-concept HasLists = can_be_recorded<Observer> && requires(const Observer& o) {
+using CoreOf = std::remove_cvref_t<decltype(RecordAccess::core(std::declval<Observer&>()))>;
+/// PredictorCorrector with such laws, or with one that runs.
+template <class Core>
+concept HasWrittenGains = requires(const Core& o) {
   requires GapGainsAreATable<std::remove_cvref_t<decltype(RecordAccess::laws(o)[0])>> ||
       (RecordAccess::kind_of<std::remove_cvref_t<decltype(RecordAccess::laws(o)[0])>> !=
            RunningLaw::none &&
-       RecordAccess::is_plain<Observer>);
+       RecordAccess::is_plain<Core>);
 };
+
+/// An observer whose lists are recorded, perhaps with a known model. What a schedule publishes is
+/// not what is known of its estimate.
+template <class Observer>
+concept HasLists = can_be_recorded<Observer> && HasWrittenGains<CoreOf<Observer>> &&
+    !(IsKnown<Observer>::value && RecordAccess::blanks<CoreOf<Observer>>);
+
+/// False for what is refused because the function of a KnownModel is typed on one scalar.
+template <class Object>
+inline constexpr bool knows_in_general = true;
+template <class Observer>
+requires is_adapter<Observer>
+inline constexpr bool knows_in_general<Observer> = knows_in_general<typename Observer::Adapted>;
+template <class Observer, class Model>
+inline constexpr bool knows_in_general<KnownModel<Observer, Model>> =
+    can_be_recorded<typename WithoutAdapter<KnownModel<Observer, Model>>::type> ||
+    !can_be_recorded<typename WithoutAdapter<Observer>::type>;
+template <class Observer, class Form>
+inline constexpr bool knows_in_general<Adrc<Observer, Form>> = knows_in_general<Observer>;
+template <class Observer>
+inline constexpr bool knows_in_general<DisturbanceCompensator<Observer>> =
+    knows_in_general<Observer>;
 
 /// The same, perhaps in an adapter.
 template <class Observer>
-concept WritableObserver =
-    HasLists<typename WithoutAdapter<Observer>::type> && !wraps_beside_gate<Observer> &&
+concept WritableObserver = HasLists<typename WithoutAdapter<Observer>::type> &&
     measures_plainly<Observer> && RecordAccess::guards_a_chain<Observer>;
 
 template <class C>
@@ -906,6 +998,7 @@ class DesignRecorder {
   using V = typename Observer::scalar_type;
   using Number = typename Recorder<Subject>::Number;
   using Numbers = std::vector<Number>;
+  using Core = CoreOf<Observer>;
   static constexpr int size = Observer::size;
   static constexpr int gains = size * Observer::levels;
 
@@ -927,6 +1020,8 @@ class DesignRecorder {
   /// subject @param name_of gives the name of a number, or ""
   template <class Of, class NameOf>
   [[nodiscard]] Check<V> record(const Of& of, const NameOf& name_of) {
+    // Without one nothing is rejected.
+    design.wrap.gated = design.wrap.gated && (design.gate.threshold > 0 || design.law.watches);
     add_observer(of);
     const auto closed = recorder_.record();
     if (!closed) return closed.error();
@@ -954,8 +1049,9 @@ class DesignRecorder {
     }
     auto object = Recorder<Subject>::as_recorded(subject_);
     const auto numbers = numbers_of<Number>(object);
-    const Number* first = &of(object).predicted_measurement();
-    using Model = typename Observer::PlantModel;
+    auto& core = RecordAccess::core(of(object));
+    const Number* first = &core.predicted_measurement();
+    using Model = typename Core::PlantModel;
     std::vector<std::pair<const Number*, const char*>> settings;
     if (!design.settings.empty()) RecordAccess::find_settings<Number>(object, settings);
     ListWriter writer(c_language, design.single);
@@ -963,18 +1059,22 @@ class DesignRecorder {
     for (std::size_t i = 0; i < numbers.size(); ++i) {
       const auto state = numbers[i] - first;
       std::string name = name_of(object, numbers[i]);
-      if (numbers[i] == &of(object).applied_input()) name = "u_applied";
-      if (numbers[i] == &of(object).innovation()) name = "innovation";
+      if (numbers[i] == &core.applied_input()) {
+        name = "u_applied";
+      } else if (numbers[i] == &of(object).applied_input()) {
+        name = "u_given";  // without what is known
+      }
+      if (numbers[i] == &core.innovation()) name = "innovation";
       for (int row = 0; row < size && 0 <= state && state < gains; ++row) {
         if (Model::state_of_row(row) != state % size) continue;
         name = "z" + std::to_string(row + 1);
         if (state >= size) name += "_level" + std::to_string(state / size + 1);
         if (state == 0) design.first_state = name;
       }
-      const int published = RecordAccess::place_in_published(of(object), numbers[i]);
+      const int published = RecordAccess::place_in_published(core, numbers[i]);
       if (published >= 0) name = "published_" + std::to_string(published);
       writer.live[i] = name[0] == 'z' || name[0] == 'p' || name == "u_applied" ||
-                       name == "u_last" ||
+                       name == "u_given" || name == "u_last" ||
                        (design.options.watched && (name == "innovation" || name == "u_asked")) ||
                        (design.guard.on && name == "innovation");
       for (const auto& [number, begins] : settings) {
@@ -987,24 +1087,29 @@ class DesignRecorder {
     design.numbers = recorded->numbers;
     for (const auto& call : recorded->calls) design.calls.push_back(call[0]);
     if (auto ok = take_angle(); !ok) return ok;
-    return take_gains(of(subject_));
+    return take_gains(RecordAccess::core(of(subject_)));
   }
 
  private:
   template <class OfAny>
   void add_observer(const OfAny& of_any) {
-    using Law =
-        std::remove_cvref_t<decltype(RecordAccess::laws(std::declval<const Observer&>())[0])>;
+    using Law = std::remove_cvref_t<decltype(RecordAccess::laws(std::declval<const Core&>())[0])>;
     constexpr RunningLaw runs = RecordAccess::kind_of<Law>;
-    const auto of = [of_any](auto& c) -> auto& { return RecordAccess::at_rest(of_any(c)); };
+    const auto all_of = [of_any](auto& c) -> auto& { return RecordAccess::at_rest(of_any(c)); };
+    const auto of = [all_of](auto& c) -> auto& { return RecordAccess::core(all_of(c)); };
+    if constexpr (RecordAccess::knows<Observer>) {
+      add("drive", {"u"}, true, [all_of](auto& c, const Numbers& in) {
+        return Numbers{RecordAccess::driven(all_of(c), in[0])};
+      });
+    }
     design.gain_is_kept = runs == RunningLaw::none && gain_law_traits<Law>.kind == GainKind::preset;
     if constexpr (runs != RunningLaw::none) {
       using Recorded = std::remove_cvref_t<decltype(RecordAccess::laws(
-          of_any(std::declval<typename Recorder<Subject>::Recorded&>()))[0])>;
+          RecordAccess::core(of_any(std::declval<typename Recorder<Subject>::Recorded&>())))[0])>;
       RecordAccess::add_law<Recorded>(
           [&](const char* name, std::vector<std::string> arguments, bool has_output, auto call) {
             add(name, std::move(arguments), has_output, [=](auto& c, const Numbers& in) {
-              const Number output = call(RecordAccess::laws(of_any(c))[0], in);
+              const Number output = call(RecordAccess::laws(RecordAccess::core(of_any(c)))[0], in);
               return has_output ? Numbers{output} : Numbers{};
             });
           });
@@ -1026,7 +1131,7 @@ class DesignRecorder {
         });
       }
     }
-    if constexpr (ShiftableOutput<Observer>) {
+    if constexpr (ShiftableOutput<Core>) {
       if (design.wrap.period > 0) {
         add("shift", {"offset"}, false, [of](auto& c, const Numbers& in) {
           (void)of(c).shift_output(in[0]);
@@ -1034,17 +1139,16 @@ class DesignRecorder {
         });
       }
     }
-    if constexpr (ShiftableLoad<Observer>) {
+    if constexpr (ShiftableLoad<Core>) {
       if (design.measured.on) {
-        const auto column = RecordAccess::load_column(of_any(subject_));
+        const auto column = RecordAccess::load_column(RecordAccess::core(of_any(subject_)));
         add("load", {"offset"}, false, [of, column](auto& c, const Numbers& in) {
           RecordAccess::load(of(c), column, in[0]);
           return Numbers{};
         });
       }
     }
-    if constexpr (model_traits<typename Observer::PlantModel>.is_chain &&
-                  size == Observer::order + 1) {
+    if constexpr (model_traits<typename Core::PlantModel>.is_chain && size == Observer::order + 1) {
       if (design.guard.on) {
         std::vector<std::string> states;
         for (int i = 1; i <= size; ++i) states.push_back("x" + std::to_string(i));
@@ -1100,21 +1204,22 @@ class DesignRecorder {
       return Numbers{};
     });
     unroll<size>([&](auto row) {
-      add("estimate_" + std::to_string(int{row}), {}, true, [of](auto& c, const Numbers&) {
-        return Numbers{RecordAccess::estimate<int{decltype(row)::value}>(of(c))};
+      add("estimate_" + std::to_string(int{row}), {}, true, [all_of](auto& c, const Numbers&) {
+        return Numbers{RecordAccess::estimate<int{decltype(row)::value}>(all_of(c))};
       });
     });
   }
 
   /// Where the law of an angle subtracts an estimate from the reference, the difference becomes its
-  /// argument: the text takes off whole turns.
+  /// argument: the text takes off whole turns. A law on physical estimates gets a reference without
+  /// them.
   [[nodiscard]] Check<V> take_angle() {
     if (!(design.wrap.period > 0) || !design.is_controller || design.error_based ||
         design.compensates) {
       return {};
     }
     const Error<V> refused{"soften", V(1), "of an angle is not written for this observer"};
-    if constexpr (RecordAccess::blanks<Observer>) {
+    if constexpr (RecordAccess::blanks<Core> || RecordAccess::knows<Observer>) {
       if (design.softens) return refused;
       return {};
     }
@@ -1150,7 +1255,7 @@ class DesignRecorder {
     return {};
   }
 
-  [[nodiscard]] Check<V> take_gains(const Observer& observer) {
+  [[nodiscard]] Check<V> take_gains(const Core& observer) {
     design.size = size;
     design.max_gap = observer.max_gap();
     design.order = Observer::order;
@@ -1164,7 +1269,7 @@ class DesignRecorder {
     return {};
   }
 
-  [[nodiscard]] Check<V> take_table(const Observer& observer) {
+  [[nodiscard]] Check<V> take_table(const Core& observer) {
     for (int elapsed = 1; elapsed <= observer.max_gap() + 1; ++elapsed) {
       std::vector<double> row;
       for (const auto& law : RecordAccess::laws(observer)) {
@@ -1234,16 +1339,14 @@ Expected<RecordedDesign, Error<typename C::scalar_type>> recorded_design(
   design.lower = static_cast<double>(controller.limiter().lower());
   design.upper = static_cast<double>(controller.limiter().upper());
   take_adapters(design, controller.observer());
-  design.law = Access::law_numbers(bare.observer());
+  design.law = Access::law_numbers(Access::core(bare.observer()));
 
   const bool wraps = design.wrap.period > 0;
   std::vector<std::string> of_rest{"y", "u"};
   if (wraps) of_rest.push_back("angle");
-  maker.add("rest_at", of_rest, false, [wraps](auto& c, const Numbers& in) {
-    auto& o = Access::at_rest(c.observer());
-    auto state = o.equilibrium(in[0], in[1]);
-    if (wraps) state(0) = in[2];
-    (void)o.reset(state);
+  const bool around_angle = design.known.around_angle;
+  maker.add("rest_at", of_rest, false, [around_angle](auto& c, const Numbers& in) {
+    Access::rest(Access::at_rest(c.observer()), in, around_angle);
     return Numbers{};
   });
   using BareObserver = typename WithoutAdapter<typename Of::type>::type;
@@ -1296,7 +1399,7 @@ Expected<RecordedDesign, Error<typename Observer::scalar_type>> recorded_design(
   const Bare bare = without_adapter(observer);
   Maker maker(bare, options);
   take_adapters(maker.design, observer);
-  maker.design.law = RecordAccess::law_numbers(bare);
+  maker.design.law = RecordAccess::law_numbers(RecordAccess::core(bare));
   const auto of = [](auto& o) -> auto& { return o; };
   const auto no_name = [](const auto&, const auto*) { return std::string(); };
   if (auto ok = maker.record(of, no_name); !ok) return ok.error();

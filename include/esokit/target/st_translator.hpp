@@ -1037,7 +1037,8 @@ class StTranslator {
               "BOOL", false, given[0].guarded, true};
     }
     static const std::map<std::string, std::string> known{
-        {"fabs", "ABS"}, {"sqrt", "SQRT"}, {"exp", "EXP"}, {"pow", "EXPT"}};
+        {"fabs", "ABS"}, {"sqrt", "SQRT"}, {"exp", "EXP"}, {"pow", "EXPT"},
+        {"sin", "SIN"},  {"cos", "COS"},   {"tan", "TAN"}, {"atan", "ATAN"}};
     std::string text;
     std::string its_type = real_;
     bool changes = false;
@@ -1046,6 +1047,9 @@ class StTranslator {
     if (const auto found = known.find(stem); found != known.end()) {
       text = found->second;
       its_type = given[0].type;
+    } else if (stem == "tanh") {
+      return {"(1.0 - (2.0 / (EXP(2.0 * " + argument(given[0]) + ") + 1.0)))", real_, false, false,
+              true};
     } else if (stem == "cbrt") {
       return {"EXPT(" + first + ", 1.0 / 3.0)", real_, false, false, true};
     } else if (stem == "expm1") {

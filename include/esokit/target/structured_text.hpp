@@ -206,7 +206,13 @@ inline StructuredText structured_text(const RecordedDesign& design) {
   }
   if (controls || design.predictive) block.body += st_starts;
   if (design.measured.on) {
-    block.input("w : $real", "the measured disturbance");
+    const std::size_t count = design.measured.paths.size();
+    if (count > 1) block.own("w : $name_numbers_" + std::to_string(count));
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::string w = count > 1 ? "w" + std::to_string(i + 1) : "w";
+      block.input(w + " : $real", "a measured disturbance");
+      if (count > 1) block.body += "w[" + std::to_string(i) + "] := " + w + ";\n";
+    }
     block.input("no_w : BOOL", "TRUE: there is none at this sample");
     block.body += st_tell_measured;
   }

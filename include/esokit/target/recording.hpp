@@ -30,6 +30,11 @@ enum class Operation : unsigned char {
   power,                 ///< a to the power of b
   exponential,           ///< e^a
   exponential_less_one,  ///< e^a - 1
+  sine,                  ///< sin(a)
+  cosine,                ///< cos(a)
+  tangent,               ///< tan(a)
+  arc_tangent,           ///< atan(a)
+  hyperbolic_tangent,    ///< tanh(a)
   choose,                ///< b if the condition a holds, else c
   less,                  ///< a < b; from here on a condition
   greater,               ///< a > b
@@ -111,6 +116,15 @@ class RecordedCondition {
   [[nodiscard]] bool holds() const noexcept { return holds_; }
   /// @endcond
 
+  /// Does not compile: both ways of a branch would have to be recorded.
+  template <std::same_as<bool> Bool>
+  explicit operator Bool() const {
+    static_assert(!std::same_as<Bool, bool>,
+                  "esokit: a branch on a value cannot be recorded: instead of if, ?:, min and max "
+                  "write select(condition, a, b)");
+    return false;
+  }
+
   /// Whether it holds in a lane; the list says that it was looked into.
   [[nodiscard]] bool operator[](int) const noexcept {
     noted_.look();
@@ -171,9 +185,12 @@ class RecordingScalar {
 
   /// Zero.
   constexpr RecordingScalar() noexcept = default;
-  /// A constant.
+  /// A constant. From V or an integer by itself, as C++ converts them beside a V, too; another
+  /// floating type would not be computed in V.
   template <class Number>
-  requires(std::is_arithmetic_v<Number>) constexpr explicit RecordingScalar(Number value) noexcept
+  requires(std::is_arithmetic_v<Number>) constexpr explicit(!std::is_same_v<Number, V> &&
+                                                            !std::is_integral_v<Number>)
+      RecordingScalar(Number value) noexcept
       : value_(static_cast<V>(value)) {}
   /// Argument number `number` of a list. @param value with which the constants beside it are made
   RecordingScalar(OperationList& list, int number, V value)
@@ -217,14 +234,29 @@ class RecordingScalar {
   }
   friend Self operator-(const Self& a) { return a.with(Operation::negate, -a.value_); }
   friend Self(abs)(const Self& a) { return a.magnitude(); }
+  friend Self fabs(const Self& a) { return a.magnitude(); }
   friend Self sqrt(const Self& a) { return a.with(Operation::square_root, std::sqrt(a.value_)); }
   friend Self exp(const Self& a) { return a.with(Operation::exponential, std::exp(a.value_)); }
   friend Self expm1(const Self& a) {
     return a.with(Operation::exponential_less_one, std::expm1(a.value_));
   }
+  friend Self sin(const Self& a) { return a.with(Operation::sine, std::sin(a.value_)); }
+  friend Self cos(const Self& a) { return a.with(Operation::cosine, std::cos(a.value_)); }
+  friend Self tan(const Self& a) { return a.with(Operation::tangent, std::tan(a.value_)); }
+  friend Self atan(const Self& a) { return a.with(Operation::arc_tangent, std::atan(a.value_)); }
+  friend Self tanh(const Self& a) {
+    return a.with(Operation::hyperbolic_tangent, std::tanh(a.value_));
+  }
   friend Self pow(const Self& a, const Self& b) {
     return a.with(Operation::power, b, std::pow(a.value_, b.value_));
   }
+  /// C++ computes the power of a float and an integer in double.
+  template <std::integral Exponent>
+  requires(sizeof(V) < sizeof(double)) friend Self pow(const Self&, Exponent) = delete;
+  friend Self& operator+=(Self& a, const Self& b) { return a = a + b; }
+  friend Self& operator-=(Self& a, const Self& b) { return a = a - b; }
+  friend Self& operator*=(Self& a, const Self& b) { return a = a * b; }
+  friend Self& operator/=(Self& a, const Self& b) { return a = a / b; }
   friend RecordedCondition operator<(const Self& a, const Self& b) {
     return a.compared(Operation::less, b, a.value_ < b.value_);
   }
@@ -286,6 +318,12 @@ class RecordingScalar {
   V value_{};
   detail::Noted noted_;
 };
+
+/// `select` where both are constants.
+template <std::floating_point V>
+[[nodiscard]] RecordingScalar<V> select(const RecordedCondition& condition, V a, V b) {
+  return select(condition, RecordingScalar<V>(a), RecordingScalar<V>(b));
+}
 
 /// To the library a pack of two lanes.
 template <class V>
