@@ -77,9 +77,8 @@ check() {  # check INCLUDE_DIR
     }' "${headers[@]}")
 }
 
-# Included by those who want them alone: pole sets, text for programs with a console, and the scalar
-# that records.
-apart="esokit/gain/pole_set.hpp esokit/core/error_text.hpp esokit/core/recording.hpp esokit/core/snapshot_text.hpp"
+# Included by those who want them alone: pole sets and text for programs with a console.
+apart="esokit/gain/pole_set.hpp esokit/core/error_text.hpp esokit/core/snapshot_text.hpp"
 heavy="algorithm complex deque fstream functional iomanip ios iostream istream iterator locale map memory"
 heavy+=" numeric ostream random ranges regex set span sstream string thread unordered_map vector"
 

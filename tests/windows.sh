@@ -155,7 +155,7 @@ units=(
   "core/pack core/scalar core/lanes core/expected core/check core/matrix core/snapshot math/combinatorics math/fal math/positivity model/integrator_chain"
   "gain/continuous_gain gain/feedback_gain gain/riccati observer/named_observer observer/predictor_corrector observer/cascade_identities adapter/outlier_gate"
   "observer/pack"
-  "control/adrc_law control/nonlinear_feedback control/pid_conversion control/retune control/tracking_differentiator control/smooth_profile"
+  "control/adrc_law control/nonlinear_feedback tune/pid_conversion control/retune control/tracking_differentiator control/smooth_profile"
   "control/experiment"
   "sim/plant sim/noise sim/counted_gaussian sim/signals sim/metrics analysis/dense identify/input_checks"
   "sim/runge_kutta model/linear_plant"

@@ -6,7 +6,7 @@
 // Plant       theta'' = a u - b theta' - c tanh(theta' / w_s) - load(t),  |u| <= u_max,
 //             y = theta, quantised by the encoder, with noise
 // Controllers u = (v - dhat) / b0 with b0 below the true a by a fifth;
-//             PID: the gains that the LESO's ADRC has as a PID (control/pid_conversion.hpp)
+//             PID: the gains that the LESO's ADRC has as a PID (tune/pid_conversion.hpp)
 //
 // symbol    code               value       unit
 // a         true_gain          80          rad/s2 per V
@@ -35,12 +35,12 @@
 #include <vector>
 
 #include <esokit/control/adrc.hpp>
-#include <esokit/control/pid_conversion.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/sim/gaussian.hpp>
 #include <esokit/sim/run.hpp>
+#include <esokit/tune/pid_conversion.hpp>
 
 #include "common/report.hpp"
 #include "control_practice/pid.hpp"

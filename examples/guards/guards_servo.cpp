@@ -14,9 +14,9 @@
 #include <array>
 #include <cstdint>
 
+#include <esokit/analysis/health_text.hpp>
 #include <esokit/control/gain_probe.hpp>
 #include <esokit/control/health.hpp>
-#include <esokit/control/health_text.hpp>
 
 #include "common/parallel.hpp"
 #include "guards/guards.hpp"

@@ -4,8 +4,8 @@
 // temperature, wanted  degC       power  %, 0 .. 100
 #pragma once
 
+#include <esokit/analysis/health_text.hpp>
 #include <esokit/control/adrc.hpp>
-#include <esokit/control/health_text.hpp>
 #include <esokit/observer/model_eso.hpp>
 #include <ostream>
 

@@ -6,8 +6,8 @@
 #pragma once
 
 #include <array>
+#include <esokit/analysis/health_text.hpp>
 #include <esokit/control/adrc.hpp>
-#include <esokit/control/health_text.hpp>
 #include <esokit/core/error_text.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <map>

@@ -3,8 +3,10 @@
 #pragma once
 
 #include <esokit/adapter/adapter.hpp>
+#include <esokit/adapter/correction_weights.hpp>
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/guarded.hpp>
+#include <esokit/adapter/guarded_states.hpp>
 #include <esokit/adapter/known_model.hpp>
 #include <esokit/adapter/measured.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
@@ -17,6 +19,7 @@
 #include <esokit/analysis/eigenvalues.hpp>
 #include <esokit/analysis/error_bound.hpp>
 #include <esokit/analysis/frequency_response.hpp>
+#include <esokit/analysis/health_text.hpp>
 #include <esokit/analysis/linear_controller.hpp>
 #include <esokit/analysis/linear_system.hpp>
 #include <esokit/analysis/loop.hpp>
@@ -38,13 +41,12 @@
 #include <esokit/control/cycle_analysis.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/control/experiment.hpp>
+#include <esokit/control/experiment_config.hpp>
 #include <esokit/control/gain_probe.hpp>
 #include <esokit/control/health.hpp>
-#include <esokit/control/health_text.hpp>
 #include <esokit/control/limiter.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/control/nonlinear_feedback.hpp>
-#include <esokit/control/pid_conversion.hpp>
 #include <esokit/control/predictive_adrc.hpp>
 #include <esokit/control/reference.hpp>
 #include <esokit/control/smooth_profile.hpp>
@@ -63,7 +65,6 @@
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/pack.hpp>
 #include <esokit/core/packed.hpp>
-#include <esokit/core/recording.hpp>
 #include <esokit/core/scalar.hpp>
 #include <esokit/core/snapshot.hpp>
 #include <esokit/core/snapshot_text.hpp>
@@ -86,6 +87,8 @@
 #include <esokit/gain/gap_certificate.hpp>
 #include <esokit/gain/gating_certificate.hpp>
 #include <esokit/gain/half_gain.hpp>
+#include <esokit/gain/mimo_filter_config.hpp>
+#include <esokit/gain/mimo_riccati.hpp>
 #include <esokit/gain/model_gain.hpp>
 #include <esokit/gain/model_placement.hpp>
 #include <esokit/gain/noise_settings.hpp>
@@ -97,6 +100,7 @@
 #include <esokit/gain/riccati.hpp>
 #include <esokit/gain/riccati_gain.hpp>
 #include <esokit/gain/riccati_gain_design.hpp>
+#include <esokit/gain/riccati_settings.hpp>
 #include <esokit/gain/sampled_gain.hpp>
 #include <esokit/gain/scheduled_gain.hpp>
 #include <esokit/gain/step_status.hpp>
@@ -125,12 +129,15 @@
 #include <esokit/model/augmented_model.hpp>
 #include <esokit/model/chain_model.hpp>
 #include <esokit/model/corrected_part.hpp>
+#include <esokit/model/disturbance_constant.hpp>
 #include <esokit/model/integrator_chain.hpp>
 #include <esokit/model/linear_plant.hpp>
 #include <esokit/model/matrix_model.hpp>
 #include <esokit/model/measured_input.hpp>
 #include <esokit/model/model_parts.hpp>
+#include <esokit/model/parts_shape.hpp>
 #include <esokit/model/plant_model.hpp>
+#include <esokit/model/plant_shape.hpp>
 #include <esokit/model/sampled_model.hpp>
 #include <esokit/model/scaled_chain.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
@@ -199,6 +206,7 @@
 #include <esokit/target/recorded_design.hpp>
 #include <esokit/target/recorded_numbers.hpp>
 #include <esokit/target/recorder.hpp>
+#include <esokit/target/recording.hpp>
 #include <esokit/target/structured_text.hpp>
 #include <esokit/target/writable.hpp>
 #include <esokit/tune/controller.hpp>
@@ -206,6 +214,7 @@
 #include <esokit/tune/families.hpp>
 #include <esokit/tune/loop_cost.hpp>
 #include <esokit/tune/lqg.hpp>
+#include <esokit/tune/pid_conversion.hpp>
 #include <esokit/tune/plain_pid.hpp>
 #include <esokit/tune/play.hpp>
 #include <esokit/tune/problem.hpp>

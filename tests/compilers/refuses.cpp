@@ -2,8 +2,8 @@
 // results have text: a plain program, as GoogleTest is not there for every standard library.
 // Returns 0 when it passes.
 #include <cstdio>
+#include <esokit/analysis/health_text.hpp>
 #include <esokit/control/adrc.hpp>
-#include <esokit/control/health_text.hpp>
 #include <esokit/core/packed.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>

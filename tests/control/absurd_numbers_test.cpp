@@ -8,12 +8,12 @@
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/control/nonlinear_feedback.hpp>
-#include <esokit/control/pid_conversion.hpp>
 #include <esokit/control/predictive_adrc.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
+#include <esokit/tune/pid_conversion.hpp>
 #include <limits>
 #include <string>
 #include <support/numbers.hpp>

@@ -6,10 +6,10 @@
 #include <cmath>
 #include <control/loop_traits.hpp>
 #include <esokit/adapter/guarded.hpp>
+#include <esokit/analysis/health_text.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/gain_probe.hpp>
 #include <esokit/control/health.hpp>
-#include <esokit/control/health_text.hpp>
 #include <esokit/control/telemetry.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/model_eso.hpp>

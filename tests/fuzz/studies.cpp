@@ -8,6 +8,7 @@
 #include <esokit/analysis/delay_margin.hpp>
 #include <esokit/analysis/error_bound.hpp>
 #include <esokit/analysis/frequency_response.hpp>
+#include <esokit/analysis/health_text.hpp>
 #include <esokit/analysis/loop.hpp>
 #include <esokit/analysis/loop_noise.hpp>
 #include <esokit/analysis/loop_response.hpp>
@@ -17,9 +18,7 @@
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/gain_probe.hpp>
 #include <esokit/control/health.hpp>
-#include <esokit/control/health_text.hpp>
 #include <esokit/control/limiter.hpp>
-#include <esokit/control/pid_conversion.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
@@ -32,6 +31,7 @@
 #include <esokit/sim/plant.hpp>
 #include <esokit/sim/run.hpp>
 #include <esokit/sim/signals.hpp>
+#include <esokit/tune/pid_conversion.hpp>
 #include <optional>
 
 #include "fuzz/config.hpp"

@@ -105,6 +105,69 @@ TEST(CascadeLevels, StayFinite) {
   levels_stay_finite<double>();
 }
 
+// ---- sample times at which finite squares do not mean finite estimates
+
+/// @param time T, so short that the root of the largest number as a state is not finite as an
+/// estimate
+template <class Observer, class S = typename Observer::scalar_type>
+void no_time_is_too_short(S time) {
+  typename Observer::Config config{};
+  config.observer_bandwidth = S(1) / (S(100) * time);
+  config.input_gain = S(1) / (time * time);
+  config.sample_time = time;
+  if constexpr (requires { config.bandwidth_factor; }) config.bandwidth_factor = S(2);
+  auto observer = Observer::make(config).value();
+  EXPECT_EQ(observer.missed(), 0);
+  const S top = std::numeric_limits<S>::max();
+  int refused = 0, taken = 0;
+  for (S y = S(1); y < top / S(16); y = y * S(4)) {
+    const StepStatus status = observer.update(y, S(0));
+    (status == StepStatus::ok ? taken : refused) += 1;
+    if (status == StepStatus::ok) {
+      EXPECT_EQ(observer.missed(), 0);
+    }
+    ASSERT_TRUE(eigen(observer.estimate()).allFinite()) << y;
+    const auto before = observer.missed();
+    observer.predict(S(0));
+    EXPECT_EQ(observer.missed(), before == 65535 ? before : before + 1);
+    observer.correct(S(0));
+    ASSERT_TRUE(eigen(observer.estimate()).allFinite()) << y;
+  }
+  EXPECT_GT(taken, 0);
+  EXPECT_GT(refused, 0);
+  // Retuned to another time and back, it knows which test it needs.
+  EXPECT_EQ(observer.reset(S(0)), StepStatus::ok);
+  auto fresh = observer;
+  config.sample_time = S(2) * time;
+  ASSERT_TRUE(fresh.retune(config).has_value());
+  EXPECT_EQ(fresh.missed(), 0);
+  EXPECT_EQ(fresh.update(S(0.5), S(0)), StepStatus::ok);
+}
+
+TEST(SampleTime, NoneIsTooShortForFiniteEstimates) {
+  no_time_is_too_short<LinearEso<2, float>>(1e-12f);
+  no_time_is_too_short<LinearEso<3, float>>(1e-8f);
+  no_time_is_too_short<CascadeEso<2, 3, float>>(1e-12f);
+  no_time_is_too_short<LinearEso<2, double>>(1e-90);
+  no_time_is_too_short<CascadeEso<2, 3, double>>(1e-90);
+}
+
+TEST(SampleTime, MissingSamplesAreCountedUpToTheEnd) {
+  for (const float time : {1e-3f, 1e-12f}) {
+    auto observer = LinearEso<2, float>::make({.observer_bandwidth = 0.01f / time,
+                                               .input_gain = 1.0f / (time * time),
+                                               .sample_time = time,
+                                               .max_gap = 65000})
+                        .value();
+    for (int k = 1; k < 65600; ++k) {
+      ASSERT_EQ(observer.predict(0.0f), StepStatus::ok);
+      ASSERT_EQ(observer.missed(), k < 65534 ? k : 65535);
+    }
+    EXPECT_EQ(observer.correct(1.0f), StepStatus::restarted);
+    EXPECT_EQ(observer.missed(), 0);
+  }
+}
+
 // ---- a model that overflows
 
 struct Steep {

@@ -22,6 +22,7 @@
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/half_gain_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
+#include <esokit/observer/mimo_extended_state_filter.hpp>
 #include <esokit/observer/model_eso.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
 #include <esokit/observer/reduced_order_eso.hpp>
@@ -40,6 +41,7 @@
 #include <esokit_before/observer/extended_state_filter.hpp>
 #include <esokit_before/observer/half_gain_eso.hpp>
 #include <esokit_before/observer/linear_eso.hpp>
+#include <esokit_before/observer/mimo_extended_state_filter.hpp>
 #include <esokit_before/observer/model_eso.hpp>
 #include <esokit_before/observer/nonlinear_eso.hpp>
 #include <esokit_before/observer/reduced_order_eso.hpp>
@@ -113,7 +115,9 @@ void tell(Bits& bits, const O& o) {
     if constexpr (requires { o.covariance(); }) bits.add(o.covariance(), o.innovation_variance());
     if constexpr (requires { o.age(); }) bits.add(o.age(), o.blanked(), o.settled());
     if constexpr (requires { o.preview(); }) bits.add(o.preview().offset, o.preview().slope);
-    if constexpr (requires { o.trust(); }) bits.add(o.trust(), o.gated(), o.bounded());
+    if constexpr (requires { o.trust(); }) bits.add(o.trust(), o.gated());
+    if constexpr (requires { o.leak_error(); }) bits.add(o.holding_input(), o.leak_error());
+    if constexpr (requires { o.bounded(); }) bits.add(o.bounded(), o.present_input_gain());
   } else {
     bits.add(o.output(), o.status());
     if constexpr (requires { o.requested(); }) bits.add(o.requested());
@@ -152,6 +156,7 @@ void call(Bits& bits, O& o, const Draw& draw, const Fill& fill) {
       if (c == 96) bits.add(o.hold(u));
       if (c == 97) o.release();
       if (c == 98) o.set_trust(t);
+      if (c == 95) o.set_pin(static_cast<decltype(o.pin())>(int(4 * t)));
     }
     if constexpr (requires { o.set_input_gain(v); }) {
       if (c == 99) bits.add(o.set_input_gain(S(1) + t).has_value());
@@ -170,6 +175,7 @@ void call(Bits& bits, O& o, const Draw& draw, const Fill& fill) {
       if constexpr (requires { o.revise_input(u); }) bits.add(o.revise_input(u));
     } else if (c < 24) {
       if constexpr (requires { o.shift_disturbance(u); }) bits.add(o.shift_disturbance(v));
+      if constexpr (requires { o.shift_load(u); }) bits.add(o.shift_load(u));
     } else if (c < 26) {
       if constexpr (requires { o.shift_output(u); }) bits.add(o.shift_output(x));
     } else if (c < 27) {
@@ -216,6 +222,44 @@ void compare(const Fill& fill) {
     tell(of_now, now);
     tell(of_before, before);
     ASSERT_EQ(of_now, of_before) << "sample " << k << ", call " << draw.call;
+  }
+}
+
+/// The same of a filter of several outputs.
+template <class Now, class Before, class Fill>
+void compare_mimo(const Fill& fill) {
+  typename Now::Config now_config{};
+  typename Before::Config before_config{};
+  fill(now_config);
+  fill(before_config);
+  auto now = Now::make(now_config).value();
+  auto before = Before::make(before_config).value();
+  Random random(seed);
+  long gap = 0;
+  for (long k = 0; k < samples; ++k) {
+    const double faults = k % 400 < 200 ? 1e-9 : 0.1;
+    const auto kind = static_cast<int>(random.uniform(0, faults < 0.01 ? 1 : 100));
+    const int missing = random.uniform(0, 2) < 1 ? 0 : 1;
+    if (k % 200 == 150) gap = static_cast<long>(random.uniform(0, 30));
+    double numbers[4];
+    for (double& x : numbers) x = drawn<double>(random, faults);
+    if (gap-- > 0) numbers[missing] = std::numeric_limits<double>::quiet_NaN();
+    const auto play = [&](auto& filter) {
+      using Filter = std::remove_cvref_t<decltype(filter)>;
+      typename Filter::Output y;
+      typename Filter::Input u;
+      for (int i = 0; i < 2; ++i) y(i) = numbers[i];
+      for (int i = 0; i < 2; ++i) u(i) = numbers[i + 2];
+      Bits bits;
+      if (kind == 1) bits.add(filter.reset(y));
+      if (kind == 2) bits.add(filter.correct(y));
+      if (kind == 3) bits.add(filter.predict(u));
+      bits.add(filter.update(y, u), filter.estimate(), filter.innovation(), filter.covariance(),
+               filter.gain(), filter.missed(0), filter.missed(1), filter.frozen(),
+               filter.innovation_covariance(), filter.normalised_innovation());
+      return bits;
+    };
+    ASSERT_EQ(play(now), play(before)) << "sample " << k;
   }
 }
 
@@ -316,7 +360,7 @@ ESOKIT_COMPARE(wrapped_gate, angle, WrappedOutput<OutlierGate<LinearEso<2>>>)
 const auto guarded = [](auto& c, double factor) {
   linear(c.observer, factor);
   c.disturbance_bound = 20;
-  c.leak_time = 4 * factor;
+  c.leak_time = decltype(c.leak_time)(4 * factor);
   c.release_samples = 3;
 };
 ESOKIT_COMPARE(guarded_linear, guarded, Guarded<LinearEso<2>>)
@@ -325,6 +369,59 @@ const auto guarded_cascade_settings = [](auto& c, double factor) {
   c.observer.bandwidth_factor = 1.5;
 };
 ESOKIT_COMPARE(guarded_cascade, guarded_cascade_settings, Guarded<CascadeEso<2, 2>>)
+// Without a bound, and with one in the unit of u that is often reached.
+const auto leaking = [](auto& c, double factor) {
+  guarded(c, factor);
+  c.disturbance_bound = 0;
+};
+ESOKIT_COMPARE(guarded_leaking, leaking, Guarded<LinearEso<1, float>>)
+const auto bounded_by_input = [](auto& c, double factor) {
+  using S = std::remove_cvref_t<decltype(c.disturbance_bound)>;
+  linear(c.observer, factor);
+  c.disturbance_bound = static_cast<S>(0.5);
+  c.unit = decltype(c.unit)::input;
+};
+ESOKIT_COMPARE(guarded_by_input, bounded_by_input, Guarded<LinearEso<3>>)
+ESOKIT_COMPARE(guarded_slopes, bounded_by_input, Guarded<LinearEso<1, float, 2>>)
+const auto guarded_time = [](auto& c, double factor) {
+  linear(c.observer.observer, factor);
+  c.disturbance_bound = 0.5;
+};
+ESOKIT_COMPARE(guarded_varying, guarded_time, Guarded<VariableTime<LinearEso<2>>>)
+const auto guarded_model = [](auto& c, double factor) {
+  bounded_by_input(c, factor);
+  c.leak_time = 4;
+  c.release_samples = 3;
+  c.observer.model.actuator.time_constant = 0.05;
+};
+ESOKIT_COMPARE(guarded_actuator, guarded_model,
+               Guarded<ModelEso<ModelParts{.order = 1, .actuator = 1}>>)
+const auto guarded_parts = [](auto& c, double factor) {
+  guarded_model(c, factor);
+  c.unit = decltype(c.unit)::output;
+  c.observer.model.plant = {1.0, 0.5};
+  c.observer.model.sensor.time_constant = 0.08;
+  c.observer.model.resonators[0].frequency = 40;
+  c.observer.model.resonators[0].capture_bandwidth = 8;
+};
+ESOKIT_COMPARE(guarded_sensor, guarded_parts,
+               Guarded<ModelEso<ModelParts{
+                   .order = 2, .plant_poles = true, .actuator = 1, .sensor = 1, .resonators = 1}>>)
+const auto guarded_sine = [](auto& c, double factor) {
+  linear(c.observer, 0.75 * factor);  // so slow that corrections are frozen after a hold
+  c.observer.model.resonators[0].frequency = 3;
+  c.observer.model.resonators[0].capture_bandwidth = 1.8;
+};
+ESOKIT_COMPARE(guarded_resonator, guarded_sine,
+               Guarded<ModelEso<ModelParts{.order = 2, .resonators = 1}>>)
+const auto guarded_angle = [](auto& c, double factor) {
+  linear(c.observer.observer.observer, factor);
+  c.observer.delay = 2;
+  c.observer.observer.period = 1.5;
+  c.disturbance_bound = 5;
+};
+ESOKIT_COMPARE(guarded_delayed_angle, guarded_angle,
+               Guarded<DelayedInput<WrappedOutput<LinearEso<2>>, 4>>)
 const auto around = [](auto& c, double factor) { linear(c.observer, factor); };
 ESOKIT_COMPARE(variable_time, around, VariableTime<LinearEso<2>>)
 const auto told = [](auto& c, double factor) {
@@ -364,6 +461,32 @@ const auto predictive = [](auto& c, double factor) {
   controller(c, factor);
 };
 ESOKIT_COMPARE(predictive_adrc, predictive, PredictiveAdrc<LinearEso<2>>)
+
+const auto several = [](auto& c) {
+  c.input_matrix(0, 0) = 2;
+  c.input_matrix(0, 1) = c.input_matrix(1, 1) = 1;
+  c.sample_time = 0.01;
+  c.measurement_covariance(0, 0) = 1e-4;
+  c.measurement_covariance(1, 1) = 2e-4;
+  c.measurement_covariance(0, 1) = c.measurement_covariance(1, 0) = 0.5e-4;
+  c.disturbance_bounds = {0, 0, 1, 0, 1};
+  c.inflation = 0.01;
+  c.max_gap = 20;
+};
+const auto several_frozen = [](auto& c) {
+  several(c);
+  c.mode = decltype(c.mode)::frozen;
+};
+TEST(Bits, several_outputs) {
+  compare_mimo<esokit::MimoExtendedStateFilter<esokit::ChainOrders<2, 1>, 2>,
+               esokit_before::MimoExtendedStateFilter<esokit_before::ChainOrders<2, 1>, 2>>(
+      several);
+}
+TEST(Bits, several_outputs_frozen) {
+  compare_mimo<esokit::MimoExtendedStateFilter<esokit::ChainOrders<2, 1>, 2>,
+               esokit_before::MimoExtendedStateFilter<esokit_before::ChainOrders<2, 1>, 2>>(
+      several_frozen);
+}
 
 }  // namespace oracle_bits
 }  // namespace esokit_test

@@ -834,7 +834,7 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
   body +=
       "    monitor.look(controller);\n"
       "    // Now and then: esokit::diagnose(monitor.health()) is LoopFault::none, or names the\n"
-      "    // fault (advice of control/health_text.hpp says what to do). wrong_sign,\n"
+      "    // fault (advice of analysis/health_text.hpp says what to do). wrong_sign,\n"
       "    // gain_too_small: set u to its safe value. measurements_rejected: look at the sensor.\n"
       "    // controller.mode() is LoopMode::safe where measurements are missing for long.\n"
       "    return u;\n  }\n};\n\n";

@@ -194,7 +194,9 @@ class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Ob
 
 /// Base of the adapters with a config: `make`, `retune`, `adopt`, and members that most adapters
 /// forward. An adapter has `check(config)`, which returns a Check, a constructor from `(observer,
-/// config)`, and `take(fresh)`, which takes over its own settings.
+/// config)`, and `take(fresh)`, which takes over its own settings once the observer has taken over
+/// its own; or, if they may be refused, `take(fresh, before)`, which returns a Check and is called
+/// of a copy. `before` is the adapter with all its old settings.
 /// @tparam Self the adapter @tparam Settings its Config
 template <class Self, LoopObserver Observer, class Settings>
 class NamedAdapter : public Adapter<Observer> {
@@ -221,8 +223,16 @@ class NamedAdapter : public Adapter<Observer> {
 
   /// The same with the settings of `fresh`, as returned by `make`: without design work.
   Check<scalar_type> adopt(const Self& fresh) {
-    if (auto ok = this->observer_.adopt(fresh.observer_); !ok) return ok;
-    static_cast<Self&>(*this).take(fresh);
+    Self& self = static_cast<Self&>(*this);
+    if constexpr (requires { self.take(fresh, self); }) {
+      Self next = self;
+      if (auto ok = next.observer_.adopt(fresh.observer_); !ok) return ok;
+      if (auto ok = next.take(fresh, self); !ok) return ok;
+      self = next;
+    } else {
+      if (auto ok = self.observer_.adopt(fresh.observer_); !ok) return ok;
+      self.take(fresh);
+    }
     return {};
   }
 

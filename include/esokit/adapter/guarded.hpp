@@ -3,175 +3,14 @@
 /// with a constant gain.
 #pragma once
 
-#include <cmath>
 #include <cstdint>
 #include <esokit/adapter/adapter.hpp>
-#include <esokit/core/kernels.hpp>
+#include <esokit/adapter/correction_weights.hpp>
+#include <esokit/adapter/guarded_states.hpp>
 #include <esokit/core/type_tag.hpp>
-#include <esokit/gain/gating_certificate.hpp>
-#include <esokit/math/dense.hpp>
-#include <esokit/model/corrected_part.hpp>
-#include <esokit/model/sampled_model.hpp>
 #include <limits>
-#include <tuple>
-#include <type_traits>
-#include <utility>
 
 namespace esokit {
-
-namespace detail {
-
-struct GuardAccess {
-  /// The observer inside all adapters.
-  template <class O>
-  static constexpr auto& innermost(O& o) noexcept {
-    using Plain = std::remove_const_t<O>;
-    if constexpr (observer_traits<Plain>.adapts) {
-      using Base = Adapter<typename Plain::Adapted>;
-      using Same = std::conditional_t<std::is_const_v<O>, const Base, Base>;
-      return innermost(static_cast<Same&>(o).observer_);
-    } else {
-      return o;
-    }
-  }
-  /// The scaled states of the observer, level by level.
-  template <class O>
-  static constexpr auto& states(O& o) noexcept {
-    return innermost(o).kept_.states;
-  }
-  /// The share of the innovation by which the next correction moves the measured value.
-  template <class O>
-  static constexpr auto measured_gain(const O& o) noexcept {
-    const auto& inner = innermost(o);
-    return std::get<0>(inner.law_gain(inner.laws_[0], {}, inner.elapsed()));
-  }
-  /// True if all estimates that belong to these states are finite.
-  template <class O, class States>
-  static constexpr bool finite(const O& o, const States& states) noexcept {
-    return is_finite(innermost(o).probe(states));
-  }
-};
-
-/// Access to the constant of the disturbance in the states: for a chain this is dhat itself.
-template <class Model, class S>
-struct DisturbanceConstant {
-  static_assert(model_traits<Model>.is_chain);
-  explicit constexpr DisturbanceConstant(const Model&) noexcept {}
-
-  template <class State>
-  [[nodiscard]] ESOKIT_INLINE static constexpr S of(const State& x) noexcept {
-    return std::get<Model::order>(x);
-  }
-  /// Replaces the value `now` of the constant by `value`.
-  template <class State>
-  ESOKIT_INLINE static constexpr void replace(State& x, const S&, const S& value) noexcept {
-    std::get<Model::order>(x) = value;
-  }
-  /// The state of a plant that stands still at y (scaled), with the disturbance of `x`.
-  template <class State>
-  [[nodiscard]] static State standing(const Model&, const State& x, const S& y) noexcept {
-    State still{};
-    std::get<0>(still) = y;
-    std::get<Model::order>(still) = std::get<Model::order>(x);
-    return still;
-  }
-  [[nodiscard]] static S scaled(const Model& model, const S& d) noexcept {
-    return model.scaled_disturbance(d);
-  }
-};
-
-/// For a model with ModelTraits::tells_constant.
-template <class Model, class S>
-requires(model_traits<Model>.tells_constant) struct DisturbanceConstant<Model, S> {
-  using State = typename Model::State;
-  using ActuatorRows = decltype(std::declval<const Model&>().actuator_rows());
-  static constexpr int lag = ActuatorRows::rows() - 1;                      ///< of the actuator
-  static constexpr int driven = Model::measured_rows + Model::order - lag;  ///< state of y^(n)
-
-  explicit DisturbanceConstant(const Model& model) noexcept
-      : row(model.constant_row()),
-        column(model.constant_column()),
-        actuator(model.actuator_rows()) {}
-
-  [[nodiscard]] ESOKIT_INLINE S of(const State& x) const noexcept {
-    S sum = std::get<0>(row) * std::get<0>(x);
-    unroll<Model::size - 1>([&](auto i) ESOKIT_INLINE_LAMBDA {
-      sum = sum + std::get<i + 1>(row) * std::get<i + 1>(x);
-    });
-    return sum;
-  }
-  ESOKIT_INLINE void replace(State& x, const S& now, const S& value) const noexcept {
-    const S more = value - now;
-    unroll<Model::size>([&](auto i) ESOKIT_INLINE_LAMBDA {
-      std::get<i>(x) = std::get<i>(x) + std::get<i>(column) * more;
-    });
-  }
-  /// A bound on the rounding error of `of`.
-  [[nodiscard]] S rounding_of(const State& x) const noexcept {
-    S sum(0);
-    for (std::size_t i = 0; i < x.size(); ++i) sum = sum + absolute(S(row[i] * x[i]));
-    return S(8) * std::numeric_limits<S>::epsilon() * sum;
-  }
-  /// The state of a plant that stands still at y, with the constant and the actuator of `x` and
-  /// without sines.
-  [[nodiscard]] State standing(const Model& model, const State& x, const S& y) const noexcept {
-    State still{};
-    still[0] = y;
-    still[Model::measured_rows] = y;
-    const State other = model.disturbance_part(still);
-    for (std::size_t i = driven; i < x.size(); ++i) still[i] = still[i] - other[i];
-    replace(still, S(0), of(x));
-    if constexpr (lag > 0) add_output(still, x, S(1));
-    return still;
-  }
-  /// The state with b0 v multiplied by `factor`; with `all` also the disturbance.
-  [[nodiscard]] State rescaled(const Model& model, State x, const S& factor,
-                               bool all) const noexcept {
-    const S more = factor - S(1);
-    if (all) {
-      const State part = model.disturbance_part(x);
-      for (std::size_t i = driven; i < x.size(); ++i) x[i] = x[i] + more * part[i];
-    } else if constexpr (lag > 0) {
-      const State before = x;
-      add_output(x, before, more);
-    }
-    return x;
-  }
-  /// Adds `share` of what the actuator's output contributes to the state `from`.
-  void add_output(State& x, const State& from, const S& share) const noexcept {
-    for (int i = 0; i <= lag; ++i) {
-      S sum(0);
-      for (int j = 0; j < Model::size; ++j) {
-        sum = sum + actuator(i, j) * from[static_cast<std::size_t>(j)];
-      }
-      S& state = x[static_cast<std::size_t>(driven + i)];
-      state = state + share * sum;
-    }
-  }
-  [[nodiscard]] static S scaled(const Model& model, const S& d) noexcept {
-    return model.scaled_constant(d);
-  }
-
-  State row;              ///< see AugmentedModel
-  State column;           ///< the same
-  ActuatorRows actuator;  ///< the same
-};
-
-}  // namespace detail
-
-/// The unit in which dhat stays constant when b0 changes, and in which its bound is given.
-enum class DisturbanceUnit : unsigned char {
-  output,  ///< unit of y^(n): a force, which does not depend on b0
-  input,   ///< unit of u: a bias of the actuator, which is multiplied by b0
-};
-
-/// The limit at which an actuator with unknown output is saturated.
-enum class Pin : unsigned char {
-  free,    ///< at none: the actuator outputs the u given to the observer
-  upper,   ///< at its upper limit: a larger u has no effect
-  lower,   ///< at its lower limit: a smaller u has no effect
-  either,  ///< at the limit given by the sign of the last u
-};
 
 /// Config of Guarded.
 template <LoopObserver Observer>
@@ -211,7 +50,8 @@ struct GuardedConfig {
 ///   outdated dhat decays. This removes the integral action: a constant load leaves a steady error,
 ///   in the estimate `leak_error()`, in y `Adrc::leak_error()`.
 /// - A changing b0: `set_input_gain(b)` before a sample, without design work. Adrc and
-///   DisturbanceCompensator use the new b0, too.
+///   DisturbanceCompensator use the new b0, too. A retune keeps trust, pin and the ratio of this b0
+///   to that of the config.
 ///
 /// With a model (ModelEso) all guards act on the constant part of d only, not on the contributions
 /// of plant poles, actuator and sines to `total_disturbance`. The unit of d and its bound is that
@@ -267,21 +107,15 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   using Base::observer_;
   using S = typename Observer::scalar_type;
   static constexpr int n = Observer::order;
-  using Model = std::remove_cvref_t<
-      decltype(detail::GuardAccess::innermost(std::declval<const Observer&>()).model())>;
+  using Guards = detail::GuardedStates<Observer>;
+  using Model = typename Guards::Model;
+  static constexpr bool varies_time = observer_traits<Observer>.varies_time;
   static constexpr bool takes_measured = observer_traits<Observer>.takes_measured;
   static constexpr bool on_chain = model_traits<Model>.is_chain;
-  static_assert(on_chain || !observer_traits<Observer>.varies_time,
+  static_assert(on_chain || !varies_time,
                 "esokit: with a model Guarded needs a fixed sample time: not with "
                 "VariableTime");
-  static constexpr bool turns_move_constant = [] {
-    if constexpr (on_chain || !observer_traits<Observer>.bears_guards) {
-      return false;
-    } else {
-      return Model::parts.plant_poles && observer_traits<Observer>.wraps_output;
-    }
-  }();
-  static_assert(!turns_move_constant,
+  static_assert(!Guards::turns_move_constant(),
                 "esokit: with the poles of a plant a whole turn is a step of the constant: Guarded "
                 "takes WrappedOutput without plant_poles");
 
@@ -292,8 +126,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   using typename Base::Estimate;
 
   /// Whether corrections of dhat may be scaled (trust, pin and hold).
-  static constexpr bool gates =
-      !on_chain || (size == n + 1 && !observer_traits<Observer>.varies_time);
+  static constexpr bool gates = !on_chain || (size == n + 1 && !varies_time);
 
   /// What the adapter can do beyond LoopObserver.
   static constexpr ObserverTraits traits = [] {
@@ -312,79 +145,43 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     if (!made) return made.error();
     if constexpr (gates) {
       for (int level = 0; level < levels; ++level) {
-        if (!made->certified(level)) {
-          return Error<S>{"level", static_cast<S>(level),
-                          "has a gain that is not proven stable if corrections of dhat are scaled: "
-                          "Re G > -1 fails"};
-        }
-        const Holding held = made->holding_of(level);
-        if (!held.stable) {
-          return Error<S>{"level", static_cast<S>(level),
-                          "has a gain that is not proven stable if the plant is held and released"};
-        }
-        if (held.settling > made->settling_samples_) {
-          made->settling_samples_ = held.settling;
-        }
+        const auto samples = Guards::settling_samples(made->observer_, level, made->set_.leak);
+        if (!samples) return samples.error();
+        if (*samples > made->set_.settling_samples) made->set_.settling_samples = *samples;
       }
     }
     return *made;
   }
 
-  /// Takes over the settings of `fresh`, as returned by `make`, without design work. As with
-  /// `retune`, trust, pin and the ratio of the present b0 to that of the config are kept.
-  Check<S> adopt(const Guarded& fresh) {
-    if (auto ok = observer_.adopt(fresh.observer_); !ok) return ok;
-    bound_ = fresh.bound_;
-    unit_ = fresh.unit_;
-    release_samples_ = fresh.release_samples_;
-    inverse_gain_ = fresh.inverse_gain_;
-    leak_ = fresh.leak_;
-    constant_ = fresh.constant_;
-    settling_samples_ = fresh.settling_samples_;
-    if (release_left_ > release_samples_) release_left_ = release_samples_;
-    if (settling_left_ > 0) settling_left_ = settling_samples_;
-    set_weights();
-    set_limit();
-    keep_bound();
-    return {};
-  }
-
   /// One sample, see PredictorCorrector::update.
   StepStatus update(S y, S u_applied) noexcept {
+    const bool stands = weights_.acts && (weights_.held || weights_.unsettled);
     // What is measured moves dhat with the prediction, which is not to be guarded.
-    bool in_parts = takes_measured || (acts_ && (held_ || unsettled_));
-    if constexpr (!on_chain) {
-      in_parts = in_parts || told_ratio_ < gain_ratio_ || told_ratio_ > gain_ratio_;
-    }
-    if (in_parts) [[unlikely]] {
+    if (takes_measured || stands || (!on_chain && changes_gain())) [[unlikely]] {
       const StepStatus predicted = predict(u_applied);
       return predicted | correct(y);
     }
     const Found before = found();
     const StepStatus status = observer_.update(y, S(u_applied * told_ratio_));
-    if constexpr (on_chain) told_ratio_ = gain_ratio_;
+    told_ratio_ = gain_ratio_;
     keep_guards(before, status);
     return status;
   }
 
   /// Time update only, see PredictorCorrector::predict.
   StepStatus predict(S u_applied) noexcept {
-    if constexpr (gates) {
-      if (held_) [[unlikely]]
-        return predict_standing(u_applied);
-    }
+    if (gates && weights_.held) [[unlikely]]
+      return predict_standing(u_applied);
     const StepStatus status = observer_.predict(S(u_applied * told_ratio_));
-    if constexpr (takes_measured) keep_bound();
+    if (takes_measured) keep_bound();
     take_gain();
     return status;
   }
 
   /// Measurement update only, see PredictorCorrector::correct.
   StepStatus correct(S y) noexcept {
-    if constexpr (gates) {
-      if (held_ || unsettled_) [[unlikely]]
-        return correct_standing(y);
-    }
+    if (gates && (weights_.held || weights_.unsettled)) [[unlikely]]
+      return correct_standing(y);
     const Found before = found();
     const StepStatus status = observer_.correct(y);
     keep_guards(before, status);
@@ -402,25 +199,14 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   /// larger phi counts as 0 or 1; one that is not finite changes nothing.
   void set_trust(const S& phi) noexcept requires gates {
     if (!is_finite(phi)) return;
-    trust_ = phi < S(0) ? S(0) : phi < S(1) ? phi : S(1);
+    weights_.trust = phi < S(0) ? S(0) : phi < S(1) ? phi : S(1);
     set_weights();
   }
 
   /// Tells at which limit the actuator is, from the next correction on. Call it once, or at every
   /// sample.
   void set_pin(Pin where) noexcept requires gates {
-    if (where == Pin::either) {
-      const S u = applied_input();
-      side_ = u > S(0) ? 1 : u < S(0) ? -1 : 0;
-    } else if (where != Pin::free) {
-      side_ = where == Pin::upper ? 1 : -1;
-    }
-    if (where != Pin::free) {
-      release_left_ = 0;
-    } else if (pin_ != Pin::free) {
-      release_left_ = release_samples_;
-    }
-    pin_ = where;
+    weights_.set_pin(where, applied_input(), set_.release_samples);
     set_weights();
   }
 
@@ -429,29 +215,19 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   /// @return the u to give to the observer instead: on the chain `holding_input`; with a model the
   ///         same u, for its actuator, while its prediction of y stands still
   S hold(const S& u_applied) noexcept requires gates {
-    held_ = true;
+    weights_.held = true;
     set_weights();
-    if constexpr (on_chain) {
-      return holding_input();
-    } else {
-      return u_applied;
-    }
+    return on_chain ? holding_input() : u_applied;
   }
   /// Ends `hold`.
   void release() noexcept requires gates {
-    held_ = false;
+    weights_.held = false;
     set_weights();
   }
 
   /// The u under which the plant would stand still if d were dhat.
   [[nodiscard]] S holding_input() const noexcept requires gates {
-    S from_d;
-    if constexpr (on_chain) {
-      from_d = -observer_.total_disturbance();
-    } else {
-      from_d = detail::GuardAccess::innermost(observer_).model().holding_input(this->estimate());
-    }
-    const S u = from_d * (inverse_gain_ * input_factor_);
+    const S u = Guards::Constant::holding(observer_) * (set_.inverse_gain * input_factor_);
     return is_finite(u) ? u : applied_input();
   }
 
@@ -461,105 +237,43 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   /// @return error for a b that is not finite, has not the sign of the config's input_gain, or is
   /// too far from it for the scalar: nothing changes then
   Check<S> set_input_gain(const S& b) noexcept {
-    const S ratio = b * inverse_gain_;
+    const S ratio = b * set_.inverse_gain;
     const S factor = S(1) / ratio;
     if (!is_finite(b) || !is_finite(ratio) || !is_finite(factor) || !(ratio > S(0))) {
       return Error<S>{
           "input_gain",      b,   "must be finite, not zero, and have the sign of the config's", -1,
           configured_gain(), true};
     }
-    if constexpr (!on_chain) {
-      // The sample that ends now still has the previous b0.
-      const auto& states = detail::GuardAccess::states(observer_);
-      if (!detail::GuardAccess::finite(observer_, rescaled(states, S(ratio / told_ratio_)))) {
+    // With a model the sample that ends now still has the previous b0.
+    const S change = on_chain ? S(ratio * input_factor_) : S(ratio / told_ratio_);
+    if (!on_chain || set_.unit == DisturbanceUnit::input) {
+      const auto next = rescaled(change);
+      if (!detail::GuardAccess::finite(observer_, next)) {
         return Error<S>{"input_gain", b, "would make the estimate not finite"};
       }
-      gain_ratio_ = ratio;
-      input_factor_ = factor;
-      return {};
-    }
-    if (unit_ == DisturbanceUnit::input) {
-      const S change = ratio * input_factor_;
-      auto scaled = detail::GuardAccess::states(observer_);
-      for (auto& level : scaled) {
-        for (std::size_t r = n; r < size; ++r) level[r] = level[r] * change;
-      }
-      if (!detail::GuardAccess::finite(observer_, scaled)) {
-        return Error<S>{"input_gain", b, "would make the estimate not finite"};
-      }
-      detail::GuardAccess::states(observer_) = scaled;
+      if (on_chain) detail::GuardAccess::states(observer_) = next;
     }
     gain_ratio_ = ratio;
     input_factor_ = factor;
-    set_limit();
-    keep_bound();
+    if (on_chain) renew_bound();
     return {};
   }
 
   /// The trust phi, 0 .. 1.
-  [[nodiscard]] const S& trust() const noexcept { return trust_; }
+  [[nodiscard]] const S& trust() const noexcept { return weights_.trust; }
   /// The last argument of `set_pin`.
-  [[nodiscard]] Pin pin() const noexcept { return pin_; }
+  [[nodiscard]] Pin pin() const noexcept { return weights_.pin; }
   /// True if the next correction of dhat will be scaled: by less than full trust, a pin, or the
   /// time after a pin.
-  [[nodiscard]] bool gated() const noexcept { return gated_; }
+  [[nodiscard]] bool gated() const noexcept { return weights_.gated; }
   /// True if dhat is at its bound.
-  [[nodiscard]] bool bounded() const noexcept {
-    if constexpr (!on_chain) {
-      const auto& x = detail::GuardAccess::states(observer_)[0];
-      return limit_ < (std::numeric_limits<S>::max)() &&
-             detail::absolute(constant_.of(x)) >= limit_ - constant_.rounding_of(x);
-    }
-    constexpr S rounding = S(1) - S(8) * std::numeric_limits<S>::epsilon();
-    return reaches(limit() * rounding);
-  }
+  [[nodiscard]] bool bounded() const noexcept { return set_.guarded.bounded(observer_, limit()); }
   /// The share of dhat that the leak removes after each correction, 0 .. 1.
-  [[nodiscard]] const S& leak_share() const noexcept { return leak_; }
+  [[nodiscard]] const S& leak_share() const noexcept { return set_.leak; }
   /// The steady error x - xhat caused by the leak, for a constant y and a constant d = 1 (unit of
   /// y^(n)): (y, .., d), N x 1. Zero without a leak.
   [[nodiscard]] Estimate leak_error() const noexcept requires gates {
-    if (!(leak_ > S(0))) return Estimate::Zero();
-    const auto& model = detail::GuardAccess::innermost(observer_).model();
-    if constexpr (!on_chain) {
-      return with_level([&](const auto& part, const auto& level) {
-        // (I - A) error = leak d.
-        constexpr int count = std::tuple_size_v<std::remove_cvref_t<decltype(level.row)>>;
-        auto kept = -level.error(S(1), leak_);
-        Matrix<S, count, 1> error;
-        const S leaking = leak_ * model.scaled_constant(S(1));
-        for (int i = 0; i < count; ++i) {
-          error(i) = leaking * level.column[static_cast<std::size_t>(i)];
-        }
-        detail::solve_in_place(detail::DenseView<S>{kept.data(), count},
-                               detail::DenseView<S>{error.data(), count, 1});
-        const auto all = part.whole * error;
-        typename Model::State x{};
-        for (int i = 0; i < size; ++i) x[static_cast<std::size_t>(i)] = all(i);
-        return model.physical(x);
-      });
-    }
-    // In steady state dhat is (1 - leak) / leak times its correction.
-    const S kept = (S(1) - leak_) / leak_;
-    S left = model.scaled_disturbance(S(1));
-    Array<S, size> error{};
-    for (int level = 0; level < levels; ++level) {
-      const auto k = observer_.level_gain(level);
-      // Each state is constant: in a step, the prediction adds what the correction removes.
-      const S share = std::get<n - 1>(k) / static_cast<S>(n);
-      const S innovation = left / (share + kept * std::get<n>(k));
-      left = share * innovation;
-      error[n] = left;
-      for (int i = n - 2; i >= 0; --i) {
-        S sum = k[static_cast<std::size_t>(i)] * innovation;
-        for (int j = i + 2; j <= n; ++j) {
-          sum = sum - static_cast<S>(binomial(j, i)) * error[static_cast<std::size_t>(j)];
-        }
-        error[static_cast<std::size_t>(i + 1)] = sum / static_cast<S>(i + 1);
-      }
-      // A level is corrected by the corrected y of the level before.
-      error[0] = error[0] + (S(1) - k[0]) * innovation;
-    }
-    return model.physical(error);
+    return set_.leak > S(0) ? Guards::leak_error(observer_, set_.leak) : Estimate(Estimate::Zero());
   }
 
   /// The present b0, unit of y^(n) per unit of u.
@@ -570,16 +284,12 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
 
   /// Adds `offset` to dhat, limited to the bound, see PredictorCorrector.
   StepStatus shift_disturbance(const S& offset) noexcept requires ShiftableDisturbance<Observer> {
-    const StepStatus status = observer_.shift_disturbance(offset);
-    if (status == StepStatus::ok) keep_bound();
-    return status;
+    return bounded_after(observer_.shift_disturbance(offset));
   }
 
   /// Adds `offset` to the load, limited to the bound, see PredictorCorrector.
   StepStatus shift_load(const S& offset) noexcept requires ShiftableLoad<Observer> {
-    const StepStatus status = observer_.shift_load(offset);
-    if (status == StepStatus::ok) keep_bound();
-    return status;
+    return bounded_after(observer_.shift_load(offset));
   }
 
   /// As of Measured, with dhat limited to the bound.
@@ -611,14 +321,23 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
  private:
   Guarded(const Observer& observer, const Config& config) noexcept
       : Base(observer),
-        bound_(config.disturbance_bound),
-        inverse_gain_(S(1) / chain_config<Observer>(config.observer).input_gain),
-        leak_(leak_of(config)),
-        constant_(detail::GuardAccess::innermost(observer).model()),
-        unit_(config.unit),
-        release_samples_(static_cast<std::uint16_t>(config.release_samples)) {
+        set_{config.disturbance_bound,
+             S(1) / chain_config<Observer>(config.observer).input_gain,
+             Guards::leak_share(config),
+             Guards(observer.model()),
+             config.unit,
+             static_cast<std::uint16_t>(config.release_samples)} {
     set_weights();
     set_limit();
+  }
+
+  /// What a retune replaces: trust, pin and the ratio of the present b0 to that of the config stay.
+  void take(const Guarded& fresh) noexcept {
+    set_ = fresh.set_;
+    if (weights_.release_left > set_.release_samples) weights_.release_left = set_.release_samples;
+    if (weights_.settling_left > 0) weights_.settling_left = set_.settling_samples;
+    set_weights();
+    renew_bound();
   }
 
   static Check<S> check(const Config& config) {
@@ -630,348 +349,142 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
         .not_negative("leak_time", config.leak_time)
         .require(gates || !(config.leak_time > S(0)), "leak_time", config.leak_time,
                  "must be 0 with an extension above 1 or a varying sample time")
-        .require(!(config.leak_time > S(0)) || leak_of(config) >= std::numeric_limits<S>::epsilon(),
+        .require(!(config.leak_time > S(0)) ||
+                     Guards::leak_share(config) >= std::numeric_limits<S>::epsilon(),
                  "leak_time", config.leak_time,
                  "is too long: what leaks in one sample is below the rounding of the scalar");
   }
 
-  /// The share of dhat that is removed after each correction.
-  static S leak_of(const Config& config) {
-    if (!(config.leak_time > S(0))) return S(0);
-    return -std::expm1(-chain_config<Observer>(config.observer).sample_time / config.leak_time);
-  }
-
   /// b0 of the config. (Of a model with an actuator input_gain() is b0 / tau.)
   [[nodiscard]] S configured_gain() const noexcept {
-    if constexpr (on_chain) {
-      return observer_.input_gain();
-    } else {
-      return S(1) / inverse_gain_;
-    }
+    return on_chain ? observer_.input_gain() : S(S(1) / set_.inverse_gain);
   }
 
-  /// Calls `use(part, level)` with the corrected part of the model, including all of its sensor.
-  template <class Use>
-  auto with_level(const Use& use) const {
-    const auto& observer = detail::GuardAccess::innermost(observer_);
-    const auto& model = observer.model();
-    const auto run = [&](const auto& part) {
-      return use(part, detail::ConstantLevel(part, model, observer.level_gain(0)));
-    };
-    using Settings = std::remove_cvref_t<decltype(chain_config<Observer>(
-        std::declval<const typename Observer::Config&>()))>;
-    if constexpr (requires(const Settings& settings) { settings.poles; }) {
-      return run(corrected_whole(model));
-    } else {
-      return model.with_corrected_part((std::numeric_limits<S>::max)(), run);
-    }
+  /// The states under another b0.
+  [[nodiscard]] auto rescaled(const S& factor) const noexcept {
+    return set_.guarded.rescaled(observer_, factor, set_.unit == DisturbanceUnit::input);
   }
 
-  [[nodiscard]] bool certified([[maybe_unused]] int level) const {
-    if constexpr (on_chain) {
-      return gating_certified<size, S>(observer_.level_gain(level), leak_);
-    } else {
-      return with_level(
-          [&](const auto&, const auto& corrected) { return gating_certified(corrected, leak_); });
-    }
-  }
-
-  [[nodiscard]] Holding holding_of([[maybe_unused]] int level) const {
-    const bool leaks = leak_ > S(0);
-    if constexpr (on_chain) {
-      return holding(detail::ConstantLevel<size, S>(observer_.level_gain(level)), leaks);
-    } else {
-      return with_level(
-          [&](const auto&, const auto& corrected) { return holding(corrected, leaks); });
-    }
-  }
-
-  template <class States>
-  [[nodiscard]] States rescaled(const States& states, const S& factor) const noexcept
-      requires(!on_chain) {
-    const auto& model = detail::GuardAccess::innermost(observer_).model();
-    return {constant_.rescaled(model, states[0], factor, unit_ == DisturbanceUnit::input)};
+  /// Whether the next sample has another b0.
+  [[nodiscard]] ESOKIT_INLINE bool changes_gain() const noexcept {
+    return told_ratio_ < gain_ratio_ || told_ratio_ > gain_ratio_;
   }
 
   /// Puts the b0 of `set_input_gain` into effect.
   ESOKIT_INLINE void take_gain() noexcept {
-    if constexpr (!on_chain) {
-      if (told_ratio_ < gain_ratio_ || told_ratio_ > gain_ratio_) [[unlikely]] {
-        auto& states = detail::GuardAccess::states(observer_);
-        const auto next = rescaled(states, S(gain_ratio_ / told_ratio_));
-        if (detail::GuardAccess::finite(observer_, next)) states = next;
-        set_limit();
-        keep_bound();
+    if (!on_chain && changes_gain()) [[unlikely]] {
+      const auto next = rescaled(S(gain_ratio_ / told_ratio_));
+      if (detail::GuardAccess::finite(observer_, next)) {
+        detail::GuardAccess::states(observer_) = next;
       }
+      renew_bound();
     }
     told_ratio_ = gain_ratio_;
   }
 
   /// After a restart at a given estimate.
   StepStatus begin(StepStatus status) noexcept {
-    if (status == StepStatus::ok) {
-      settling_left_ = 0;
-      frozen_ = false;
-      settle(true);
-      keep_bound();
-    }
+    if (status == StepStatus::ok) stand_for(0);
+    return bounded_after(status);
+  }
+  StepStatus bounded_after(StepStatus status) noexcept {
+    if (status == StepStatus::ok) keep_bound();
     return status;
   }
-
-  void settle(bool settled) noexcept {
-    unsettled_ = !settled;
+  void stand_for(int settling_samples) noexcept {
+    weights_.stand_for(settling_samples);
     set_weights();
   }
 
-  [[nodiscard]] static constexpr bool refused(StepStatus status) noexcept {
-    return has(status, StepStatus::measurement_rejected | StepStatus::outlier_rejected);
-  }
-
-  /// Puts each level at rest at y, with its disturbance.
-  template <class States>
-  void stand(const States& with, const S& y) noexcept {
-    const auto& inner = detail::GuardAccess::innermost(observer_);
-    States still = with;
-    for (auto& level : still) level = constant_.standing(inner.model(), level, y);
-    if (detail::GuardAccess::finite(observer_, still)) {
-      detail::GuardAccess::states(observer_) = still;
-    }
-  }
-
   /// Prediction while held: d and the actuator continue, and the sensor follows a constant y.
-  ESOKIT_COLD StepStatus predict_standing(S u_applied) noexcept requires gates {
-    constexpr auto y = static_cast<std::size_t>(Model::state_of_row(0));
-    auto& states = detail::GuardAccess::states(observer_);
-    const auto before = states;
+  ESOKIT_COLD StepStatus predict_standing(S u_applied) noexcept {
+    const auto before = detail::GuardAccess::states(observer_);
     const StepStatus status = observer_.predict(S(u_applied * told_ratio_));
     if (!has(status, StepStatus::prediction_dropped)) {
-      const auto& inner = detail::GuardAccess::innermost(observer_);
-      const auto& model = inner.model();
-      // The shift of y by an adapter.
-      const S turns =
-          states[0][y] - model.predict(before[0], model.drive(S(inner.applied_input())))[y];
-      auto still = before[0];
-      for (std::size_t i = y + 1; i < still.size(); ++i) {
-        const bool moves = i < y + n || i > y + Model::order;  // a derivative of y, or a sine
-        if (moves && (still[i] < S(0) || still[i] > S(0))) settle(false);
-        still[i] = S(0);
-      }
-      stand(states, S(before[0][y] + turns));
-      if constexpr (y > 0) {
-        still = model.predict(still, model.drive(S(0)));
-        for (std::size_t i = 0; i < y; ++i) states[0][i] = still[i] + (i == 0 ? turns : S(0));
-      }
+      if (set_.guarded.stand_still(observer_, before)) weights_.unsettled = true;
+      set_weights();
     }
-    if constexpr (takes_measured) keep_bound();
+    if (takes_measured) keep_bound();
     take_gain();
     return status;
   }
 
   /// Correction while held: y is what is measured, and dhat stays.
-  ESOKIT_COLD StepStatus correct_standing(S y) noexcept requires gates {
-    const auto& inner = detail::GuardAccess::innermost(observer_);
+  ESOKIT_COLD StepStatus correct_standing(S y) noexcept {
     const auto before = detail::GuardAccess::states(observer_);
     const S left = S(1) - detail::GuardAccess::measured_gain(observer_);
     const StepStatus status = observer_.correct(y);
-    if (!refused(status)) {
-      settling_left_ = settling_samples_;
-      frozen_ = false;
-      settle(true);
-      // y itself, in the turn in which an adapter has put it.
-      stand(before, S(detail::GuardAccess::states(observer_)[0][0] + left * inner.innovation()));
+    if (!weights_.refused(status)) {
+      stand_for(set_.settling_samples);
+      set_.guarded.stand_at_measurement(observer_, before, left);
     }
     // What stands has no correction to scale, also after a restart.
     keep_guards(found(), status);
     return status;
   }
 
-  /// The disturbance states, level by level.
-  using Found = Array<S, Base::levels>;
-  [[nodiscard]] ESOKIT_INLINE Found found() const noexcept {
-    Found all{};
-    if constexpr (!on_chain) {
-      if (!acts_) return all;
-    }
-    const auto& states = detail::GuardAccess::states(observer_);
-    detail::unroll<levels>([&](auto level) ESOKIT_INLINE_LAMBDA {
-      std::get<level>(all) = constant_.of(std::get<level>(states));
-    });
-    return all;
+  using Found = typename Guards::Found;
+  ESOKIT_INLINE Found found() const noexcept {
+    return on_chain || weights_.acts ? set_.guarded.found(observer_) : Found{};
   }
 
   /// Applies the guards after a correction. @param before dhat of the levels before it, which no
   /// prediction changes (m = 1)
   ESOKIT_INLINE void keep_guards(const Found& before, StepStatus status) noexcept {
-    if constexpr (gates) {
-      if (acts_) [[unlikely]] {
-        if (settling_left_ > 0 && gated_ && !held_ && !frozen_) {
-          frozen_ = true;
-          settling_left_ = settling_samples_;
-          set_weights();
-        }
-        // After a restart the old dhat is meaningless.
-        if (gated_ && !has(status, StepStatus::restarted)) gate(before);
-        if (!refused(status)) {
-          for (auto& level : detail::GuardAccess::states(observer_)) {
-            const S d = constant_.of(level);
-            put(level, d, S(d - leak_ * d));
-          }
-          const bool released = release_left_ > 0 && --release_left_ == 0;
-          const bool settled = settling_left_ > 0 && --settling_left_ == 0;
-          if (settled) frozen_ = false;
-          if (released || settled) set_weights();
-        }
+    if (gates && weights_.acts) [[unlikely]] {
+      if (weights_.freezes(set_.settling_samples)) set_weights();
+      // After a restart the old dhat is meaningless.
+      if (weights_.gated && !has(status, StepStatus::restarted)) {
+        set_.guarded.gate(observer_, before, weights_.up, weights_.down);
+      }
+      if (!weights_.refused(status)) {
+        set_.guarded.leak(observer_, set_.leak);
+        if (weights_.counts_down()) set_weights();
       }
     }
-    if constexpr (!on_chain) {
-      // A refused measurement changes nothing, not even by rounding.
-      if (refused(status)) return;
-    }
-    if (beyond_bound()) [[unlikely]]
+    // With a model a refused measurement changes nothing, not even by rounding.
+    if (!on_chain && weights_.refused(status)) return;
+    if (set_.guarded.beyond(observer_, limit())) [[unlikely]]
       keep_bound();
   }
+  ESOKIT_COLD void keep_bound() noexcept { set_.guarded.keep_bound(observer_, limit()); }
 
-  /// Puts `value` in the place of the constant `now`; where the states of a model are so large that
-  /// the sum would not be finite, they stay.
-  template <class State>
-  ESOKIT_INLINE void put(State& state, const S& now, const S& value) const noexcept {
-    if constexpr (on_chain) {
-      constant_.replace(state, now, value);
-    } else {
-      State next = state;
-      constant_.replace(next, now, value);
-      if (is_finite(detail::GuardAccess::innermost(observer_).model().finite_probe(next))) {
-        state = next;
-      }
-    }
+  void set_weights() noexcept { weights_.weigh(observer_.input_gain() > S(0), set_.leak > S(0)); }
+
+  void renew_bound() noexcept {
+    set_limit();
+    keep_bound();
   }
-
-  /// Takes back the part of the correction that does not count.
-  ESOKIT_INLINE void gate(const Found& before) noexcept {
-    auto& states = detail::GuardAccess::states(observer_);
-    detail::unroll<levels>([&](auto level) ESOKIT_INLINE_LAMBDA {
-      auto& state = std::get<level>(states);
-      const S d = constant_.of(state);
-      const S moved = d - std::get<level>(before);
-      put(state, d,
-          S(std::get<level>(before) + (moved > S(0) ? weight_up_ : weight_down_) * moved));
-    });
-  }
-
-  ESOKIT_COLD void set_weights() noexcept {
-    const bool one_sided = pin_ != Pin::free || release_left_ > 0;
-    const int freeing = observer_.input_gain() > S(0) ? side_ : -side_;
-    const bool none = held_ || frozen_;
-    weight_up_ = none || (one_sided && freeing <= 0) ? S(0) : trust_;
-    weight_down_ = none || (one_sided && freeing >= 0) ? S(0) : trust_;
-    gated_ = none || one_sided || trust_ < S(1);
-    acts_ = gated_ || unsettled_ || settling_left_ > 0 || leak_ > S(0);
-  }
-
   void set_limit() noexcept {
-    const S most = (std::numeric_limits<S>::max)();
-    S bound = bound_;
-    if (unit_ == DisturbanceUnit::input) {
-      bound = bound * detail::absolute(S(configured_gain() * gain_ratio_));
-    }
-    bound_in_force_ = bound > S(0) && is_finite(bound) ? bound : most;
-    limit_ = scaled_limit();
-  }
-
-  [[nodiscard]] S scaled_limit() const noexcept {
-    const S most = (std::numeric_limits<S>::max)();
-    const S scaled = detail::DisturbanceConstant<Model, S>::scaled(
-        detail::GuardAccess::innermost(observer_).model(), bound_in_force_);
-    return bound_in_force_ < most && is_finite(scaled) ? scaled : most;
+    const bool by_input = set_.unit == DisturbanceUnit::input;
+    const S present = by_input ? detail::absolute(S(configured_gain() * gain_ratio_)) : S(1);
+    bound_in_force_ = set_.bound * present;
+    limit_ = Guards::limit(observer_, bound_in_force_);
   }
 
   /// The bound in the scaling of the states.
   [[nodiscard]] S limit() const noexcept {
-    if constexpr (observer_traits<Observer>.varies_time) {
-      return scaled_limit();
-    } else {
-      return limit_;
-    }
+    return varies_time ? Guards::limit(observer_, bound_in_force_) : limit_;
   }
 
-  [[nodiscard]] ESOKIT_INLINE bool beyond_bound() const noexcept {
-    const S most = limit();
-    if constexpr (!on_chain) {
-      if (!(most < (std::numeric_limits<S>::max)())) return false;
-    }
-    const auto& states = detail::GuardAccess::states(observer_);
-    S sum = constant_.of(std::get<0>(states));
-    bool beyond = detail::absolute(sum) > most;
-    detail::unroll<levels - 1>([&](auto below) ESOKIT_INLINE_LAMBDA {
-      sum = sum + std::get<n>(std::get<below + 1>(states));
-      beyond = beyond || detail::absolute(sum) > most;
-    });
-    return beyond;
-  }
+  /// What a retune replaces.
+  struct Set {
+    S bound;                               ///< in the unit of the config
+    S inverse_gain;                        ///< 1 / b0 of the config
+    S leak;                                ///< share of dhat that is removed after each correction
+    [[no_unique_address]] Guards guarded;  ///< of a model
+    DisturbanceUnit unit;
+    std::uint16_t release_samples;
+    int settling_samples = 0;  ///< see Holding
+  };
 
-  [[nodiscard]] bool reaches(const S& most) const noexcept {
-    S sum{};
-    for (const auto& level : detail::GuardAccess::states(observer_)) {
-      sum = sum + level[n];
-      if (!(detail::absolute(sum) < most)) return true;
-    }
-    return false;
-  }
-
-  /// Limits the dhat of each level, summed with the levels below it, to the bound.
-  ESOKIT_COLD void keep_bound() noexcept {
-    const S most = limit();
-    if constexpr (!on_chain) {
-      auto& x = detail::GuardAccess::states(observer_)[0];
-      const S d = constant_.of(x);
-      // Not for its rounding: what has been put to the bound stays as it is.
-      if (detail::absolute(d) - most > constant_.rounding_of(x)) {
-        put(x, d, d > S(0) ? most : S(-most));
-      }
-      return;
-    }
-    S below{};
-    for (auto& level : detail::GuardAccess::states(observer_)) {
-      const S sum = below + level[n];
-      if (detail::absolute(sum) > most) {
-        const S end = sum > S(0) ? most : S(-most);
-        level[n] = end - below;
-        if constexpr (size > n + 1) {
-          // The slopes of the levels are not distinguished: the slope of this one must not lead out
-          // of the bound.
-          if (level[n + 1] * end > S(0)) {
-            for (std::size_t r = n + 1; r < size; ++r) level[r] = S(0);
-          }
-        }
-      }
-      below = below + level[n];
-    }
-  }
-
-  S bound_;                ///< in the unit of the config
-  S bound_in_force_;       ///< unit of y^(n), at the present b0
+  S bound_in_force_;       ///< unit of y^(n), at the present b0; 0: none
   S limit_;                ///< the same, scaled
   S gain_ratio_ = S(1);    ///< present b0 divided by b0 of the config
   S told_ratio_ = S(1);    ///< gain_ratio when the law computed the u that comes next
   S input_factor_ = S(1);  ///< 1 / gain_ratio
-  S inverse_gain_;         ///< 1 / b0 of the config
-  S leak_;                 ///< share of dhat that is removed after each correction
-  [[no_unique_address]] detail::DisturbanceConstant<Model, S> constant_;  ///< of a model
-  S trust_ = S(1);
-  S weight_up_ = S(1);    ///< factor on corrections that raise dhat
-  S weight_down_ = S(1);  ///< factor on corrections that lower dhat
-  DisturbanceUnit unit_;
-  Pin pin_ = Pin::free;
-  signed char side_ = 0;  ///< limit at which the actuator is pinned: 1 upper, -1 lower, 0 unknown
-  bool held_ = false;
-  bool unsettled_ = false;  ///< held, but no measurement has told where since
-  bool gated_ = false;
-  bool frozen_ = false;  ///< no correction of dhat counts until the observer has settled
-  bool acts_ = false;    ///< any of these, or a leak: one test in the hot path
-  std::uint16_t release_samples_;
-  std::uint16_t release_left_ = 0;
-  int settling_samples_ = 0;  ///< see Holding
-  int settling_left_ = 0;     ///< since the last sample held
+  Set set_;
+  detail::CorrectionWeights<S> weights_{};
 };
 
 /// Distinguishes the type in snapshots.

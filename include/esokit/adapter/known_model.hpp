@@ -50,6 +50,9 @@ struct KnownModelConfig {
 /// The change of fbar within a step, O(T), remains in dhat. Because fbar is computed from the
 /// estimate, it is part of the error dynamics: omega_o should be well above the slopes of fbar.
 ///
+/// Retuning keeps the estimate fbar + d, so u does not jump: d becomes what the new fbar does not
+/// explain.
+///
 /// A function that is generic in the scalar, `template <class E> auto operator()(const E& x) const
 /// noexcept` with `select` for branches, can be written in C by `to_c`, too.
 /// @tparam Model your function fbar(estimate)
@@ -84,27 +87,6 @@ class KnownModel : public NamedAdapter<KnownModel<Observer, Model>, Observer,
     traits.bears_guards = false;
     return traits;
   }();
-
-  /// Takes over the settings of `fresh`, as returned by `make`, without design work. As with
-  /// `retune`, the estimate fbar + d is kept; d becomes the part that the new fbar does not
-  /// explain, and a change of b0 is moved into d as usual. u does not jump.
-  Check<S> adopt(const KnownModel& fresh) {
-    KnownModel next = *this;
-    const S fed = observer_.applied_input() - rest_.applied_input;
-    const S gain_change = this->input_gain() - fresh.input_gain();
-    if (auto ok = next.observer_.adopt(fresh.observer_); !ok) return ok;
-    next.rest_.model = fresh.rest_.model;
-    next.rest_.inverse_gain = fresh.rest_.inverse_gain;
-    // The observer added (b0_old - b0_new) times its whole input to d; the share of fbar in this
-    // input must be taken out again.
-    const S moved = known_part() - next.known_part() - gain_change * fed;
-    const bool some = !is_finite(moved) || moved < S(0) || moved > S(0);
-    if (some && next.observer_.shift_disturbance(moved) != StepStatus::ok) {
-      return Error<S>{"model", moved, "would make the estimate not finite"};
-    }
-    *this = next;
-    return {};
-  }
 
   /// One sample, see PredictorCorrector::update. `u_applied` is the u that the actuator held,
   /// without the contribution of the model.
@@ -177,6 +159,23 @@ class KnownModel : public NamedAdapter<KnownModel<Observer, Model>, Observer,
  private:
   KnownModel(const Observer& observer, const KnownModelConfig<Observer, Model>& config) noexcept
       : Base(observer), rest_{config.model, S(1) / observer.input_gain(), S(0)} {}
+
+  /// As with `retune`, the estimate fbar + d is kept; d becomes the part that the new fbar does not
+  /// explain, and a change of b0 is moved into d as usual. u does not jump.
+  Check<S> take(const KnownModel& fresh, const KnownModel& before) noexcept {
+    rest_.model = fresh.rest_.model;
+    rest_.inverse_gain = fresh.rest_.inverse_gain;
+    // The observer added (b0_old - b0_new) times its whole input to d; the share of fbar in this
+    // input must be taken out again.
+    const S fed = before.observer_.applied_input() - before.rest_.applied_input;
+    const S gain_change = before.input_gain() - fresh.input_gain();
+    const S moved = before.known_part() - known_part() - gain_change * fed;
+    const bool some = !is_finite(moved) || moved < S(0) || moved > S(0);
+    if (some && observer_.shift_disturbance(moved) != StepStatus::ok) {
+      return Error<S>{"model", moved, "would make the estimate not finite"};
+    }
+    return {};
+  }
 
   static Check<S> check(const KnownModelConfig<Observer, Model>& config) {
     if constexpr (detail::declared_traits<Model, PlantModelTraits>.checks) {

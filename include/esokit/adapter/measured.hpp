@@ -71,26 +71,6 @@ class Measured : public NamedAdapter<Measured<Observer, Count, Delay>, Observer,
     return traits;
   }();
 
-  /// Takes over the settings of `fresh`, as returned by `make`, without design work. f + d and the
-  /// memory of w are kept; d becomes what the new f does not explain.
-  /// @return error if the new gain times a w of the memory is more than the scalar can hold
-  Check<S> adopt(const Measured& fresh) {
-    Measured next = *this;
-    next.most_lost_ = fresh.most_lost_;
-    for (std::size_t i = 0; i < Count; ++i) {
-      next.paths_[i].adopt(fresh.paths_[i]);
-      const S& gain = fresh.paths_[i].input().gain;
-      if (!next.paths_[i].takes_memory(Count) || !next.paths_[i].takes(last_[i], Count)) {
-        return Error<S>{"inputs.gain", gain, "would make the effect of the present w not finite",
-                        static_cast<int>(i)};
-      }
-    }
-    if (auto ok = next.observer_.adopt(fresh.observer_); !ok) return ok;
-    next.told_ = next.sum();
-    *this = next;
-    return {};
-  }
-
   /// w[k], before the step that ends at k. NaN: lost.
   void measured(const S& w) noexcept requires(Count == 1) { given_[0] = w; }
   /// The same for all of them, Count x 1; a lost one is NaN.
@@ -192,6 +172,21 @@ class Measured : public NamedAdapter<Measured<Observer, Count, Delay>, Observer,
     const S time = chain_config<Observer>(config.observer).sample_time;
     for (std::size_t i = 0; i < Count; ++i) paths_[i] = {config.inputs[i], time};
     forget();
+  }
+
+  /// f + d and the memory of w are kept; d becomes what the new f does not explain.
+  /// @return error if the new gain times a w of the memory is more than the scalar can hold
+  Check<S> take(const Measured& fresh, const Measured&) noexcept {
+    most_lost_ = fresh.most_lost_;
+    for (std::size_t i = 0; i < Count; ++i) {
+      paths_[i].adopt(fresh.paths_[i]);
+      if (!paths_[i].takes_memory(Count) || !paths_[i].takes(last_[i], Count)) {
+        return Error<S>{"inputs.gain", fresh.paths_[i].input().gain,
+                        "would make the effect of the present w not finite", static_cast<int>(i)};
+      }
+    }
+    told_ = sum();
+    return {};
   }
 
   static Check<S> check(const Settings& config) {

@@ -263,16 +263,14 @@ class WrappedOutput
       const bool input = has(status, StepStatus::input_rejected);
       return restart(reading) | (input ? StepStatus::input_rejected : StepStatus::ok);
     }
-    if constexpr (gated) {
-      if (has(status, StepStatus::outlier_rejected)) {
-        hear(reading);
-        recentre();
-        return status;
-      }
+    if (gated && has(status, StepStatus::outlier_rejected)) {
+      hear(reading);
+      recentre();
+      return status;
     }
     if (!reading.fits) status |= StepStatus::turn_assumed;
+    if (!reading.heard) learn(count_, reading);
     if constexpr (gated) {
-      if (!reading.heard) learn(count_, reading);
       hear(reading);
       // Turns are counted from the measurements that the observer has used.
       if (reading.heard) {
@@ -282,8 +280,6 @@ class WrappedOutput
       }
       heard_.at = 0;
       heard_.rejected = 0;
-    } else {
-      learn(count_, reading);
     }
     recentre();
     return status;
@@ -335,7 +331,7 @@ class WrappedOutput
 
   void forget() noexcept {
     count_ = Count{};
-    if constexpr (gated) heard_ = Heard{};
+    heard_ = {};
   }
 
   StepStatus begin(StepStatus status) noexcept {

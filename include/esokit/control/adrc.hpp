@@ -280,8 +280,13 @@ class Adrc {
   /// u for a reference, as ControlLoop asks for it.
   template <class Given>
   ESOKIT_INLINE auto asked(const Given& reference) noexcept {
-    return [this, &reference](bool special)
-               ESOKIT_INLINE_LAMBDA { return special ? judged(reference) : command(reference); };
+    if constexpr (std::is_same_v<Given, S>) {  // a number that need not lie in memory
+      return [this, reference](bool special)
+                 ESOKIT_INLINE_LAMBDA { return special ? judged(reference) : command(reference); };
+    } else {
+      return [this, &reference](bool special)
+                 ESOKIT_INLINE_LAMBDA { return special ? judged(reference) : command(reference); };
+    }
   }
   struct NoSpec {
     constexpr NoSpec() = default;
@@ -370,8 +375,7 @@ class Adrc {
       if constexpr (error_based) {
         return detail::by_present_gain(observer(), S(weights_[0] * x + rest));
       } else {
-        S error = reference - x;
-        if constexpr (wraps) error = observer().wrap(error);
+        const S error = detail::wrapped(observer(), S(reference - x));
         return detail::by_present_gain(observer(), S(weights_[0] * error - rest));
       }
     } else {
@@ -398,7 +402,7 @@ class Adrc {
     for (int i = 0; i <= order; ++i) {
       e(i) = error_based ? S(estimate(i)) : S(reference(i) - estimate(i));
     }
-    if constexpr (wraps && !error_based) e(0) = observer().wrap(e(0));
+    if (!error_based) e(0) = detail::wrapped(observer(), S(e(0)));
     return e;
   }
 

@@ -50,8 +50,6 @@ class AdrcLaw {
     S input_gain{};  ///< b0 of the plant, not zero, negative is fine
   };
   using scalar_type = S;  ///< type of signals and settings
-  template <class T>
-  using with_scalar = AdrcLaw<Order, T>;  ///< the same with another scalar
 
   /// Checks the settings and does all the design work.
   /// @return the law, or an error that names the field

@@ -117,6 +117,16 @@ requires detail::WritesText<Stream> Stream& operator<<(Stream& out, Value mode) 
 
 namespace detail {
 
+/// A difference of angles by the shorter way; any other number as it is.
+template <class Observer, Scalar S>
+ESOKIT_INLINE S wrapped(const Observer& observer, const S& difference) noexcept {
+  if constexpr (observer_traits<Observer>.wraps_output) {
+    return observer.wrap(difference);
+  } else {
+    return difference;
+  }
+}
+
 /// Converts a u computed with b0 of the observer's config to the present b0.
 template <class Observer, Scalar S>
 ESOKIT_INLINE S by_present_gain(const Observer& observer, const S& u) noexcept {
@@ -140,9 +150,6 @@ class ControlLoop {
   using S = typename Observer::scalar_type;  ///< type of signals and settings
   using scalar_type = S;                     ///< the same type
   using Status = StatusOf<S>;                ///< StepStatus, for a pack one per lane
-  template <class T>
-  using with_scalar =
-      ControlLoop<detail::WithScalar<Observer, T>>;  ///< the same with another scalar
 
   /// Checks the settings.
   /// @param observer as returned by its `make`
@@ -301,8 +308,6 @@ class ControlLoop {
   [[nodiscard]] const Limiter<S>& limiter() const noexcept { return limiter_; }
 
  private:
-  template <LoopObserver Other>
-  friend class ControlLoop;
   friend struct detail::LaneAccess;
   friend struct detail::RecordAccess;
   static constexpr bool has_step_time = observer_traits<Observer>.varies_time;
@@ -351,7 +356,7 @@ class ControlLoop {
   }
 
   template <class Law>
-  S put_out(Law&& law) noexcept {
+  S put_out(Law law) noexcept {
     return limited(mode_ == LoopMode::running ? S(law(true)) : other_output());
   }
 

@@ -214,8 +214,8 @@ class DisturbanceCompensator {
   [[nodiscard]] ESOKIT_INLINE S command(S base_output) const noexcept {
     return base_output + unbounded_compensation();
   }
-  ESOKIT_INLINE auto asked(const S& base_output) const noexcept {
-    return [this, &base_output](bool) ESOKIT_INLINE_LAMBDA { return command(base_output); };
+  ESOKIT_INLINE auto asked(S base_output) const noexcept {
+    return [this, base_output](bool) ESOKIT_INLINE_LAMBDA { return command(base_output); };
   }
 
   Loop loop_;

@@ -109,14 +109,12 @@ template <PlainScalar S>
 
 namespace detail {
 
-template <class Observer>
-constexpr const auto& in_adapters(const Observer& observer) noexcept {
-  if constexpr (observer_traits<Observer>.adapts) {
-    return in_adapters(observer.observer());
-  } else {
-    return observer;
-  }
-}
+/// Order of the actuator's lag that a model simulates.
+template <class Model>
+inline constexpr int simulated_lag = 0;
+template <class Model>
+requires(model_traits<Model>.tells_constant) inline constexpr int simulated_lag<Model> =
+    Model::parts.actuator;
 
 }  // namespace detail
 
@@ -191,16 +189,10 @@ class HealthMonitor {
   void look(const Controller& controller) noexcept {
     const auto& observer = controller.observer();
     using Observer = std::remove_cvref_t<decltype(observer)>;
-    const auto& model = detail::in_adapters(observer).model();
+    const auto& model = observer.model();
     using Model = std::remove_cvref_t<decltype(model)>;
     constexpr bool tells = model_traits<Model>.tells_constant;
-    constexpr int lag = [] {
-      if constexpr (tells) {
-        return Model::parts.actuator;
-      } else {
-        return 0;
-      }
-    }();
+    constexpr int lag = detail::simulated_lag<Model>;
     static_assert(Observer::size - lag == Size,
                   "esokit: Size of the monitor must be the number of states of the observer, minus "
                   "those of an actuator in its model");

@@ -87,8 +87,6 @@ class Limiter {
 
  private:
   friend struct detail::LaneAccess;
-  template <Scalar Other>
-  friend class Limiter;
 
   static constexpr int data_members = 7;
 

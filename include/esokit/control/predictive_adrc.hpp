@@ -312,13 +312,8 @@ class PredictiveAdrc {
   }
 
   /// True if the observer will accept y, that is, if no estimate would become infinite.
-  [[nodiscard]] ESOKIT_INLINE auto usable(const S& y,
-                                          [[maybe_unused]] const S& raw) const noexcept {
-    if constexpr (preset) {
-      return is_finite(S(guard_ * y));
-    } else {
-      return is_finite(raw);
-    }
+  [[nodiscard]] ESOKIT_INLINE auto usable(const S& y, const S& raw) const noexcept {
+    return is_finite(preset ? S(guard_ * y) : raw);
   }
 
   /// For samples after a gap, or if u does not depend on y.

@@ -28,8 +28,6 @@ template <int Order, Scalar S = double>
 class Softening {
  public:
   using scalar_type = S;  ///< type of signals and settings
-  template <class T>
-  using with_scalar = Softening<Order, T>;  ///< the same with another scalar
 
   /// Checks the settings.
   /// @param wanted left out: on for n >= 3, if both limits of u are given and k_0 > 0
@@ -115,13 +113,7 @@ class Softening {
 
   /// x^(1/n); `pow` takes 2 KB of flash.
   static S root(const S& x) noexcept {
-    if constexpr (Order == 1) {
-      return x;
-    } else if constexpr (Order == 2) {
-      return std::sqrt(x);
-    } else {
-      return std::pow(x, S(1) / static_cast<S>(Order));
-    }
+    return Order == 1 ? x : Order == 2 ? std::sqrt(x) : std::pow(x, S(1) / static_cast<S>(Order));
   }
 
   ESOKIT_COLD void advance(const S& u, const Limiter<S>& limiter, const S& time) noexcept {

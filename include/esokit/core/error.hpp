@@ -31,28 +31,14 @@ struct Error {
 template <class ScalarType>
 inline constexpr bool has_text<Error<ScalarType>> = true;
 
-namespace detail {
-
-/// The value in the lane to which an error belongs.
-template <class ScalarType>
-constexpr const auto& value_in_lane(const ScalarType& value, [[maybe_unused]] int lane) noexcept {
-  if constexpr (lane_count < ScalarType >> 1) {
-    return value[lane < 0 ? 0 : lane];
-  } else {
-    return value;
-  }
-}
-
-}  // namespace detail
-
 /// Writes `field[index] = value: rule limit (lane number)`, without the parts that do not apply.
 template <class Stream, class ScalarType>
-requires detail::WritesText<Stream, int, LaneScalar<ScalarType>> Stream& operator<<(
+requires detail::WritesText<Stream, int, ScalarType> Stream& operator<<(
     Stream& out, const Error<ScalarType>& error) {
   out << error.field;
   if (error.index >= 0) out << "[" << error.index << "]";
-  out << " = " << detail::value_in_lane(error.value, error.lane) << ": " << error.rule;
-  if (error.has_limit) out << " " << detail::value_in_lane(error.limit, error.lane);
+  out << " = " << error.value << ": " << error.rule;
+  if (error.has_limit) out << " " << error.limit;
   if (error.lane >= 0) out << " (lane " << error.lane << ")";
   return out;
 }
@@ -61,15 +47,11 @@ requires detail::WritesText<Stream, int, LaneScalar<ScalarType>> Stream& operato
 template <class ScalarType>
 void print_last_words([[maybe_unused]] const Error<ScalarType>& error) noexcept {
 #if defined(__linux__) || defined(_WIN32) || defined(__APPLE__)
-  if constexpr (PlainScalar<LaneScalar<ScalarType>>) {
+  if constexpr (PlainScalar<ScalarType>) {
     std::fprintf(stderr, "esokit: %s", error.field);
     if (error.index >= 0) std::fprintf(stderr, "[%d]", error.index);
-    std::fprintf(stderr, " = %Lg: %s",
-                 static_cast<long double>(detail::value_in_lane(error.value, error.lane)),
-                 error.rule);
-    if (error.has_limit)
-      std::fprintf(stderr, " %Lg",
-                   static_cast<long double>(detail::value_in_lane(error.limit, error.lane)));
+    std::fprintf(stderr, " = %Lg: %s", static_cast<long double>(error.value), error.rule);
+    if (error.has_limit) std::fprintf(stderr, " %Lg", static_cast<long double>(error.limit));
     if (error.lane >= 0) std::fprintf(stderr, " (lane %d)", error.lane);
     std::fprintf(stderr, " (value() was called on a refused config)\n");
   }

@@ -97,6 +97,12 @@ template <class S, std::size_t Size>
   return sum;
 }
 
+/// Adds the squares of all elements. One sum after the other: each is one multiply-add.
+template <class S, std::size_t Size>
+ESOKIT_INLINE constexpr void add_squares(S& sum, const std::array<S, Size>& x) noexcept {
+  unroll<Size>([&](auto r) ESOKIT_INLINE_LAMBDA { sum = sum + std::get<r>(x) * std::get<r>(x); });
+}
+
 /// The magnitudes of all elements.
 template <class S, std::size_t Size>
 [[nodiscard]] ESOKIT_INLINE constexpr std::array<S, Size> magnitudes(

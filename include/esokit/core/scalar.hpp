@@ -77,6 +77,31 @@ constexpr bool is_finite(T value) noexcept {
   return detail::finite_bits(value);
 }
 
+namespace detail {
+
+/// False if float is computed in software.
+#if defined(__SOFTFP__) || defined(__riscv_float_abi_soft)
+inline constexpr bool has_float_unit = false;
+#else
+inline constexpr bool has_float_unit = true;
+#endif
+
+/// `is_finite` of a number that is NaN or has no sign: one instruction less.
+/// @{
+template <class S>
+constexpr auto is_finite_magnitude(const S& value) noexcept {
+  return is_finite(value);
+}
+constexpr bool is_finite_magnitude(float value) noexcept {
+  return std::bit_cast<std::uint32_t>(opaque(value)) < 0x7f800000u;
+}
+constexpr bool is_finite_magnitude(double value) noexcept {
+  return std::bit_cast<std::uint64_t>(opaque(value)) < 0x7ff0000000000000u;
+}
+/// @}
+
+}  // namespace detail
+
 /// `condition ? a : b`, element by element for packs.
 template <PlainScalar T>
 constexpr T select(bool condition, T a, T b) noexcept {
@@ -91,7 +116,7 @@ constexpr bool all(bool condition) noexcept { return condition; }
 template <class T>
 inline constexpr int lane_count = 1;
 
-/// Whether a scalar records its operations, see core/recording.hpp. A step leaves out no part of
+/// Whether a scalar records its operations, see target/recording.hpp. A step leaves out no part of
 /// its work for such a scalar, whatever the numbers are: else the list would lack it.
 template <class T>
 inline constexpr bool records = false;

@@ -66,5 +66,17 @@ ESOKIT_INLINE constexpr void keep_scalar([[maybe_unused]] T& value) noexcept {
 #endif
 }
 
+/// Keeps the vectoriser from packing stores before this with stores after it, without adding an
+/// instruction: the next load of one of them stalls if it is narrower or wider. @param value what
+/// is stored next
+template <class T>
+ESOKIT_INLINE constexpr void keep_stores_apart([[maybe_unused]] T& value) noexcept {
+#if defined(__GNUC__) && !defined(__clang__) && (defined(__SSE2__) || defined(__aarch64__))
+  if constexpr (std::is_same_v<T, float> || std::is_same_v<T, double>) {
+    if (!std::is_constant_evaluated()) asm("" : "+m"(value));
+  }
+#endif
+}
+
 }  // namespace detail
 }  // namespace esokit

@@ -233,21 +233,23 @@ class AlgebraicGain {
   /// place.
   ESOKIT_COLD constexpr void anchor(std::uint32_t count) noexcept {
     // Computes p^c and 1 - p^c together: each is obtained from the other where nothing cancels.
-    power_ = S(1.0);
-    bracket_ = S(0.0);
+    S power(1.0);
+    S contraction(0.0);
     S base_power = decay_;
     S base_contraction = shift_.contraction;
     for (std::uint32_t rest = count; rest != 0; rest >>= 1u) {
-      if ((rest & 1u) != 0) anchor_take(base_power, base_contraction);
+      if ((rest & 1u) != 0) anchor_take(power, contraction, base_power, base_contraction);
       base_contraction = base_contraction + base_power * base_contraction;
       base_power = squared(base_power, base_contraction);
     }
-    bracket_ = bracket(detail::integer<S>(count), bracket_);
+    power_ = power;
+    bracket_ = bracket(detail::integer<S>(count), contraction);
   }
-  /// One bit of it. Until the end 1 - p^c stands in the place of [c].
-  constexpr void anchor_take(const S& base_power, const S& base_contraction) noexcept {
-    bracket_ = bracket_ + power_ * base_contraction;
-    power_ = power_ * base_power;
+  /// One bit of it.
+  ESOKIT_INLINE static constexpr void anchor_take(S& power, S& contraction, const S& base_power,
+                                                  const S& base_contraction) noexcept {
+    contraction = contraction + power * base_contraction;
+    power = power * base_power;
   }
   /// The square of a power of p. @param contraction 1 minus this square
   static constexpr S squared(const S& power, const S& contraction) noexcept {
@@ -333,7 +335,8 @@ class AlgebraicGain {
     gain_ = current_gain<Size, S>(weights);
   }
 
-  ESOKIT_COLD void settle_if_due() noexcept {
+  // Not cold: GCC would compile `settle` for size, and the update that settles is the longest one.
+  ESOKIT_INLINE void settle_if_due() noexcept {
     if (all(settled_below_ >= std::get<0>(ratios_u_)) && !(age_ <= least_age_)) settle();
   }
   void settle() noexcept {

@@ -141,7 +141,45 @@ struct ConstantLevel {
     }
     return all;
   }
+
+  /// The steady error of the states under a constant d. @param d scaled @param leak a
+  [[nodiscard]] Matrix<S, Size, 1> leak_error(const S& leak, const S& d) const {
+    // (I - A) error = leak d.
+    auto kept = -error(S(1.0), leak);
+    Matrix<S, Size, 1> left;
+    const S leaking = leak * d;
+    for (int i = 0; i < Size; ++i) left(i) = leaking * column[static_cast<std::size_t>(i)];
+    solve_in_place(DenseView<S>{kept.data(), Size}, DenseView<S>{left.data(), Size, 1});
+    return left;
+  }
 };
+
+/// The same for the levels of a chain, in closed form.
+template <int Order, Scalar S, std::size_t Levels>
+Array<S, Order + 1> leak_error(const std::array<ScaledGain<Order + 1, S>, Levels>& gains,
+                               const S& leak, const S& d) noexcept {
+  // In steady state dhat is (1 - leak) / leak times its correction.
+  const S kept = (S(1.0) - leak) / leak;
+  S left = d;
+  Array<S, Order + 1> error{};
+  for (const auto& k : gains) {
+    // Each state is constant: in a step, the prediction adds what the correction removes.
+    const S share = std::get<Order - 1>(k) / static_cast<S>(Order);
+    const S innovation = left / (share + kept * std::get<Order>(k));
+    left = share * innovation;
+    error[Order] = left;
+    for (int i = Order - 2; i >= 0; --i) {
+      S sum = k[static_cast<std::size_t>(i)] * innovation;
+      for (int j = i + 2; j <= Order; ++j) {
+        sum = sum - static_cast<S>(binomial(j, i)) * error[static_cast<std::size_t>(j)];
+      }
+      error[static_cast<std::size_t>(i + 1)] = sum / static_cast<S>(i + 1);
+    }
+    // A level is corrected by the corrected y of the level before.
+    error[0] = error[0] + (S(1.0) - k[0]) * innovation;
+  }
+  return error;
+}
 
 /// q_0 .. q_N of det(x I - M) for M = (I + E / 2)^-1 E / unit, by the Faddeev-LeVerrier algorithm.
 /// With E = A - I this is the polynomial of A after the bilinear map, see error_polynomial.

@@ -75,7 +75,7 @@ class AlgebraicEso
 
   /// One sample, see PredictorCorrector::update.
   [[gnu::flatten]] Status update(S y, S u_applied) noexcept {
-    if (settled() == true && this->missed() == 0) [[likely]] {
+    if (settled() == true && this->may_be_quick()) [[likely]] {
       const Status status = Base::update(y, u_applied);
       if (status != StepStatus::ok) [[unlikely]]
         return after_trouble(status);

@@ -171,10 +171,8 @@ class ExtendedStateFilter
       if (!usual()) (void)y[0];  // branches on numbers
       return Base::update(y, u_applied);
     } else {
-      if constexpr (!has_model) {
-        if (law().rests_unwatched()) [[likely]]
-          return Base::update(y, u_applied);
-      }
+      if (!has_model && law().rests_unwatched()) [[likely]]
+        return Base::update(y, u_applied);
       return update_out_of_line(y, u_applied);
     }
   }
@@ -324,10 +322,8 @@ class ExtendedStateFilter
 
   // A function of its own, so that the step of a frozen filter contains only a tail call.
   [[gnu::noinline]] StepStatus update_out_of_line(S y, S u_applied) noexcept {
-    if constexpr (!has_model) {
-      if (!gated()) [[likely]]
-        return Base::update(y, u_applied);
-    }
+    if (!has_model && !gated()) [[likely]]
+      return Base::update(y, u_applied);
     const StepStatus predicted = predict(u_applied);
     return predicted | correct(y);
   }

@@ -5,46 +5,12 @@
 
 #include <cmath>
 #include <esokit/gain/covariance_factor.hpp>
+#include <esokit/gain/mimo_filter_config.hpp>
+#include <esokit/gain/mimo_riccati.hpp>
 #include <esokit/gain/noise_settings.hpp>
-#include <esokit/gain/riccati.hpp>
-#include <esokit/gain/riccati_gain.hpp>
 #include <esokit/gain/step_status.hpp>
-#include <optional>
 
 namespace esokit {
-
-/// The orders n_1 .. n_p of the chains.
-template <int... Orders>
-struct ChainOrders {
-  static_assert(sizeof...(Orders) >= 1, "esokit: at least one chain is needed");
-  static_assert(((Orders >= 1) && ...), "esokit: the order of a chain must be at least 1");
-  static constexpr int count = static_cast<int>(sizeof...(Orders));  ///< p
-  static constexpr int sum = (Orders + ...);                         ///< n_1 + .. + n_p
-  static constexpr Array<int, count> values{Orders...};              ///< n_1 .. n_p
-};
-
-/// Config of MimoExtendedStateFilter.
-template <class Orders, int Inputs, Scalar S, int Extension>
-struct MimoExtendedStateFilterConfig {
-  static constexpr int outputs = Orders::count;                   ///< p
-  static constexpr int size = Orders::sum + outputs * Extension;  ///< N
-  using Covariance = Matrix<S, size, size>;                       ///< N x N
-  using OutputCovariance = Matrix<S, outputs, outputs>;           ///< p x p
-
-  Matrix<S, outputs, Inputs> input_matrix = Matrix<S, outputs, Inputs>::Zero();  ///< B0, p x q
-  S sample_time{};                                                               ///< T, s
-  OutputCovariance measurement_covariance = OutputCovariance::Zero();  ///< R, p x p, semidefinite
-  Array<S, size> disturbance_bounds{};                 ///< q_r per state, as in ExtendedStateFilter
-  S bound_factor{static_cast<double>(size)};           ///< c
-  std::optional<Covariance> process_covariance{};      ///< Q, N x N, replaces the bounds
-  Covariance initial_covariance = Covariance::Zero();  ///< P0, N x N, positive semidefinite
-  InflationRule inflation_rule = InflationRule::fixed;  ///< fixed or none
-  S inflation{};                                        ///< theta > 0 of the fixed rule
-  RiccatiMode mode = RiccatiMode::recursive;            ///< recursive or frozen
-  bool allow_vanishing_gain = false;                    ///< see ExtendedStateFilter
-  int max_gap = 100;  ///< missing samples of a channel in a row that a correction may bridge,
-                      ///< 1 .. 65000; after more its chain restarts from the measurement
-};
 
 /// Extended state filter of p plants y_i^(n_i) = d_i + sum_j B0_ij u_j, sampled exactly. Couplings
 /// between the plants other than B0 are part of d_i. The noises of the measurements may be
@@ -84,7 +50,7 @@ class MimoExtendedStateFilter {
   static Expected<MimoExtendedStateFilter, Error<S>> make(const Config& config) {
     Rules<S> rules;
     Covariance noise = config.process_covariance.value_or(Covariance::Zero());
-    rules.all_of(check(config)).all_of(detail::add_bounds(config, noise));
+    rules.all_of(detail::check_filter(config)).all_of(detail::add_bounds(config, noise));
     if (!rules) return rules.error();
     if (config.inflation_rule == InflationRule::fixed) {
       noise = noise * ((S(1) + config.inflation) / config.inflation);
@@ -97,8 +63,8 @@ class MimoExtendedStateFilter {
       factor = *made;
       return {};
     };
-    rules.all_of(factored("initial_covariance", config.initial_covariance, filter.start_))
-        .all_of(factored(detail::noise_field(config), noise, filter.noise_));
+    rules.all_of(factored("initial_covariance", config.initial_covariance, filter.recursion_.start))
+        .all_of(factored(detail::noise_field(config), noise, filter.recursion_.noise));
     const OutputCovariance measured = config.measurement_covariance / filter.unit_;
     for (int i = 0; i < outputs; ++i) {
       rules.require(!(measured(i, i) > S(0)) || detail::is_held(measured(i, i)),
@@ -111,17 +77,17 @@ class MimoExtendedStateFilter {
       return Error<S>{"measurement_covariance", config.measurement_covariance(0, 0),
                       not_semidefinite};
     }
-    filter.measurement_ = *measurement;
+    filter.recursion_.measurement = *measurement;
     if (auto ok = filter.check_way_back(config, noise); !ok) return ok.error();
     if (config.mode == RiccatiMode::frozen) {
-      if (!filter.freeze(noise)) {
+      if (!filter.recursion_.freeze(noise, filter.root_units_)) {
         return Error<S>{detail::noise_field(config), noise(size - 1, size - 1),
                         "gives no limit gain: without inflation the highest state of every chain "
                         "must be disturbed"};
       }
     }
-    filter.restart();
-    if (!filter.fits()) {
+    filter.recursion_.restart();
+    if (!filter.recursion_.fits()) {
       return Error<S>{"inflation", config.inflation,
                       "lets the covariance grow beyond what the scalar can hold"};
     }
@@ -156,7 +122,7 @@ class MimoExtendedStateFilter {
       for (int r = first(chain); r < end(chain); ++r) next(r) = state_(r);
     }
     state_ = next;
-    advance_covariance();
+    recursion_.advance(missed_, max_gap_);
     return status;
   }
 
@@ -186,15 +152,15 @@ class MimoExtendedStateFilter {
       }
       if (!any_used) break;
       if (!all_used) {
-        standing_ = false;
-        prepare(used);
+        recursion_.standing = false;
+        recursion_.prepare(used);
         changed = true;
       }
-      const Estimate next = state_ + gain_ * e;
+      const Estimate next = state_ + recursion_.gain * e;
       if (finite(next)) {
         state_ = next;
         innovation_ = e;
-        corrected_ = true;
+        recursion_.corrected = true;
         for (int i = 0; i < outputs; ++i) {
           if (used[index(i)]) missed_[index(i)] = 0;
         }
@@ -213,7 +179,7 @@ class MimoExtendedStateFilter {
           state_is_to_blame ? restart_chain(worst, y(worst)) : StepStatus::measurement_rejected;
       changed = true;
     }
-    if (changed) prepare_all();
+    if (changed) recursion_.prepare_all();
     return status;
   }
 
@@ -232,7 +198,7 @@ class MimoExtendedStateFilter {
     state_ = next;
     innovation_ = Output::Zero();
     missed_.fill(0);
-    restart();
+    recursion_.restart();
     return StepStatus::ok;
   }
 
@@ -268,7 +234,7 @@ class MimoExtendedStateFilter {
   /// Covariance of the innovation, C P- C' + R of the last prediction, p x p. An element that
   /// overflows is given as the largest number of the scalar.
   [[nodiscard]] OutputCovariance innovation_covariance() const noexcept {
-    OutputCovariance s = seen_covariance() * unit_;
+    OutputCovariance s = recursion_.seen_covariance() * unit_;
     for (int i = 0; i < s.size(); ++i) s.data()[i] = detail::clipped(s.data()[i]);
     return s;
   }
@@ -279,27 +245,14 @@ class MimoExtendedStateFilter {
     const S largest = detail::largest_magnitude(innovation_);
     if (!(largest > S(0))) return S(0);
     const Output e = innovation_ / largest;
-    const auto weighted = detail::solve_positive<outputs, 1, S>(seen_covariance(), e);
+    const auto weighted = detail::solve_positive<outputs, 1, S>(recursion_.seen_covariance(), e);
     return weighted ? detail::clipped(S(largest * (largest / unit_) * e.dot(*weighted))) : S(0);
   }
 
   /// Bound on the covariance of the error of the present estimate, N x N, physical units. An
   /// element that overflows is given as the largest number of the scalar.
   [[nodiscard]] Covariance covariance() const noexcept {
-    Covariance p = factor_.matrix();
-    if (corrected_) {
-      // (I - K C) P- (I - K C)' + K R K' with R, not R / (1 + theta).
-      Covariance rest = Covariance::Identity();
-      for (int i = 0; i < outputs; ++i) {
-        for (int r = 0; r < size; ++r) rest(r, first(i)) -= gain_(r, i);
-      }
-      // The gain is zero for channels that were left out.
-      const auto spread = gain_ * used_measurement_.matrix();
-      const auto noise = detail::plus_product_transposed<size, outputs, size, S>(
-          Covariance::Zero(), spread, gain_, S(1));
-      p = detail::plus_product_transposed<size, size, size, S>(noise, rest * p, rest, S(1));
-    }
-    p = detail::in_units(p, inverse(root_units_).data());
+    Covariance p = detail::in_units(recursion_.covariance(), inverse(root_units_).data());
     for (int i = 0; i < p.size(); ++i) p.data()[i] = detail::clipped(p.data()[i]);
     return p;
   }
@@ -307,7 +260,7 @@ class MimoExtendedStateFilter {
   /// Gain of the next correction (all channels present), N x p, physical units.
   [[nodiscard]] Gain gain() const noexcept {
     const Estimate rate = inverse(units_);
-    Gain gain = gain_;
+    Gain gain = recursion_.gain;
     for (int r = 0; r < size; ++r) {
       for (int i = 0; i < outputs; ++i) gain(r, i) = rate(r) * gain(r, i);
     }
@@ -315,29 +268,18 @@ class MimoExtendedStateFilter {
   }
 
   /// True while the filter is in frozen mode and does not run the recursion.
-  [[nodiscard]] bool frozen() const noexcept { return standing_; }
+  [[nodiscard]] bool frozen() const noexcept { return recursion_.standing; }
 
   /// T, s.
   [[nodiscard]] const S& sample_time() const noexcept { return sample_time_; }
 
  private:
+  using Rows = detail::ChainRows<Orders, Extension>;
+  static constexpr std::size_t index(int i) noexcept { return Rows::index(i); }
+  static constexpr int order_of(int chain) noexcept { return Rows::order_of(chain); }
+  static constexpr int first(int chain) noexcept { return Rows::first(chain); }
+  static constexpr int end(int chain) noexcept { return Rows::end(chain); }
   using Factor = CovarianceFactor<size, S>;
-  using Transition = MatrixTransition<size, S>;
-
-  static constexpr std::size_t index(int i) noexcept { return static_cast<std::size_t>(i); }
-  static constexpr int order_of(int chain) noexcept { return Orders::values[index(chain)]; }
-
-  /// Index of the first state of a chain.
-  static constexpr int first(int chain) noexcept {
-    int begin = 0;
-    for (int i = 0; i < chain; ++i) begin += order_of(i) + Extension;
-    return begin;
-  }
-
-  /// Index after its last state.
-  static constexpr int end(int chain) noexcept {
-    return first(chain) + order_of(chain) + Extension;
-  }
 
   /// A gap longer than any max_gap.
   static constexpr int restart_due = 65535;
@@ -355,7 +297,7 @@ class MimoExtendedStateFilter {
         for (int j = 0; j < Inputs; ++j) drive_(chain, j) = config.input_matrix(chain, j) * unit;
       }
     }
-    if (config.inflation_rule == InflationRule::fixed) growth_ = S(1) + config.inflation;
+    if (config.inflation_rule == InflationRule::fixed) recursion_.growth = S(1) + config.inflation;
     // The unit of all variances: the largest of R, or without noise the largest variance of the
     // config.
     S unit = config.measurement_covariance(0, 0);
@@ -379,7 +321,7 @@ class MimoExtendedStateFilter {
 
   /// For each chain as in ExtendedStateFilter, see FilterDesign.
   Check<S> check_way_back(const Config& config, const Covariance& noise) const {
-    OutputCovariance exact = measurement_.matrix();
+    OutputCovariance exact = recursion_.measurement.matrix();
     for (int chain = 0; chain < outputs; ++chain) {
       bool driven = false;
       for (int r = first(chain); r < end(chain); ++r) driven = driven || noise(r, r) > S(0);
@@ -410,7 +352,7 @@ class MimoExtendedStateFilter {
       }
     }
     if (!none && config.inflation >= S(0.01)) return {};
-    const Covariance q = noise_.matrix();
+    const Covariance q = recursion_.noise.matrix();
     Check<S> ok{};
     detail::unroll<outputs>([&](auto chain) {
       constexpr int length = Orders::values[chain] + Extension;
@@ -426,16 +368,6 @@ class MimoExtendedStateFilter {
                                S(least * unit_));
     });
     return ok;
-  }
-
-  /// C P- C' + R, divided by the unit.
-  [[nodiscard]] OutputCovariance seen_covariance() const noexcept {
-    const Covariance p = factor_.matrix();
-    OutputCovariance s = measurement_.matrix();
-    for (int i = 0; i < outputs; ++i) {
-      for (int j = 0; j < outputs; ++j) s(i, j) += p(first(i), first(j));
-    }
-    return s;
   }
 
   static Estimate inverse(const Estimate& units) noexcept {
@@ -468,17 +400,6 @@ class MimoExtendedStateFilter {
     return true;
   }
 
-  /// True if the recursion stays within the range of the scalar.
-  [[nodiscard]] bool fits() const {
-    MimoExtendedStateFilter run = *this;
-    for (int k = 0; k < 8 * size; ++k) {
-      if (!detail::all_finite(run.gain_) || !detail::all_finite(run.factor_.matrix())) return false;
-      run.corrected_ = true;
-      run.advance_covariance();
-    }
-    return true;
-  }
-
   /// Restarts chain i at (y_i, 0, .., 0) with its part of P0, or of the limit.
   StepStatus restart_chain(int chain, const S& y) noexcept {
     Estimate next = state_;
@@ -487,66 +408,12 @@ class MimoExtendedStateFilter {
     if (!finite(next, chain)) return StepStatus::measurement_rejected;
     state_ = next;
     missed_[index(chain)] = 0;
-    Covariance p = factor_.matrix();
-    const Covariance fresh = (has_limit_ ? limit_ : start_).matrix();
-    for (int r = first(chain); r < end(chain); ++r) {
-      for (int i = 0; i < size; ++i) {
-        const bool own = i >= first(chain) && i < end(chain);
-        p(r, i) = own ? fresh(r, i) : S(0);
-        p(i, r) = p(r, i);
-      }
-    }
-    factor_ = Factor::nearest(p);
-    standing_ = false;
-    if constexpr (outputs == 1) restart();
+    recursion_.restart_chain(chain);
     return StepStatus::restarted;
   }
 
   static bool positive(const OutputCovariance& r) noexcept {
     return detail::solve_positive<outputs, 1, S>(r, Output::Zero()).has_value();
-  }
-
-  static Check<S> check(const Config& config) {
-    Rules<S> rules;
-    rules.positive("sample_time", config.sample_time)
-        .invertible("sample_time", config.sample_time)
-        .require(1 <= config.max_gap && config.max_gap <= 65000, "max_gap",
-                 static_cast<S>(config.max_gap), "must be 1 .. 65000");
-    for (int i = 0; i < outputs; ++i) {
-      for (int j = 0; j < Inputs; ++j) {
-        rules.finite("input_matrix", config.input_matrix(i, j), i * Inputs + j);
-      }
-      S unit(1);
-      for (int r = 1; r < order_of(i) + Extension; ++r) {
-        unit = unit * config.sample_time / static_cast<S>(r);
-        rules.representable("sample_time", config.sample_time, unit,
-                            "to the power of a chain's highest state, over its factorial, leaves "
-                            "the scalar's range");
-        for (int j = 0; r == order_of(i) && j < Inputs; ++j) {
-          const S& gain = config.input_matrix(i, j);
-          if (!(detail::absolute(gain) > S(0))) continue;
-          rules.representable("input_matrix", gain, S(gain * unit),
-                              "times T^n / n! gives a gain that the scalar cannot hold",
-                              i * Inputs + j);
-        }
-      }
-    }
-    rules
-        .require(detail::largest_magnitude(config.input_matrix) > S(0), "input_matrix", S(0),
-                 "must not be zero")
-        .require(config.inflation_rule != InflationRule::adaptive, "inflation_rule", S(0),
-                 "must be fixed or none for several chains");
-    rules.all_of(detail::check_inflation<S>(config))
-        .require(config.mode != RiccatiMode::start_table, "mode", S(0),
-                 "must be recursive or frozen for several chains");
-    rules.all_of(
-        detail::check_covariance("measurement_covariance", config.measurement_covariance, false));
-    if (config.process_covariance) {
-      rules.all_of(
-          detail::check_covariance("process_covariance", *config.process_covariance, false));
-    }
-    return rules.all_of(
-        detail::check_covariance("initial_covariance", config.initial_covariance, false));
   }
 
   /// Phi x + Gamma u: Pascal's triangle applied to each chain, as sums of neighbours.
@@ -567,181 +434,8 @@ class MimoExtendedStateFilter {
     return x;
   }
 
-  [[nodiscard]] static Covariance transition() noexcept {
-    Covariance phi = Covariance::Zero();
-    for (int chain = 0; chain < outputs; ++chain) {
-      for (int i = 0; i < order_of(chain) + Extension; ++i) {
-        for (int j = i; j < order_of(chain) + Extension; ++j) {
-          phi(first(chain) + i, first(chain) + j) =
-              binomial_table<size, S>[static_cast<std::size_t>(j)][static_cast<std::size_t>(i)];
-        }
-      }
-    }
-    return phi;
-  }
-
-  void advance_covariance() noexcept {
-    if (standing_) {
-      if (corrected_ || fresh_) {
-        corrected_ = false;
-        fresh_ = false;
-        return;
-      }
-      standing_ = false;
-    }
-    if (corrected_) factor_ = posterior_;
-    corrected_ = false;
-    fresh_ = false;
-    // As in RiccatiGain: in a gap P- of a chain stops growing once an estimate depends on the next
-    // measurement only.
-    Transition step{transition(), {}};
-    Covariance& phi = step.phi;
-    Covariance held;  // Q of the chains that still grow
-    bool any_held = false;
-    for (int chain = 0; chain < outputs; ++chain) {
-      if (missed_[index(chain)] < 3 || !tells_nothing(chain)) continue;
-      if (!any_held) held = noise_.matrix();
-      any_held = true;
-      const S still = S(1) / std::sqrt(growth_);
-      for (int r = first(chain); r < end(chain); ++r) {
-        for (int j = first(chain); j < end(chain); ++j) phi(r, j) *= still;
-        for (int j = 0; j < size; ++j) held(r, j) = held(j, r) = S(0);
-      }
-      // After max_gap the chain will restart, so its covariance no longer matters.
-      if (missed_[index(chain)] > max_gap_ + 1) {
-        for (int r = first(chain); r < end(chain); ++r) {
-          for (int j = first(chain); j < end(chain); ++j) phi(r, j) = r == j ? phi(r, r) : S(0);
-        }
-      }
-    }
-    factor_.advance(growth_, any_held ? Factor::nearest(held) : noise_, step);
-    prepare_all();
-    if (has_limit_ && factor_.near(limit_, S(1e-3))) stand();
-  }
-
-  /// True if P- of the chain is so large in comparison with R that the estimate depends on the next
-  /// measurement only.
-  [[nodiscard]] bool tells_nothing(int chain) const noexcept {
-    const Covariance p = factor_.matrix();
-    const OutputCovariance r = measurement_.matrix();
-    S variance(0);
-    S noise(0);
-    for (int i = first(chain); i < end(chain); ++i) variance = detail::larger(variance, p(i, i));
-    for (int i = 0; i < outputs; ++i) noise = detail::larger(noise, r(i, i));
-    return variance > noise / detail::rounding<S>();
-  }
-
-  void prepare_all() noexcept {
-    Array<bool, outputs> used{};
-    used.fill(true);
-    prepare(used);
-  }
-
-  /// Computes gain and corrected covariance for a measurement with these channels, one after the
-  /// other: with R = L D L' the rows of L^-1 y are measurements with independent noise of variances
-  /// D.
-  void prepare(const Array<bool, outputs>& used) noexcept {
-    used_measurement_ = measurement_;
-    bool all_used = true;
-    for (const bool channel : used) all_used = all_used && channel;
-    if (!all_used) {
-      OutputCovariance r = measurement_.matrix();
-      for (int i = 0; i < outputs; ++i) {
-        if (used[index(i)]) continue;
-        for (int j = 0; j < outputs; ++j) r(i, j) = r(j, i) = S(0);
-      }
-      used_measurement_ = CovarianceFactor<outputs, S>::nearest(r);
-    }
-    // L^-1, row by row.
-    OutputCovariance apart = OutputCovariance::Identity();
-    for (int i = 0; i < outputs; ++i) {
-      for (int k = 0; k < i; ++k) {
-        for (int j = 0; j <= k; ++j) apart(i, j) -= used_measurement_.lower(i, k) * apart(k, j);
-      }
-    }
-    posterior_ = factor_;
-    Gain gain = Gain::Zero();  // of L^-1 y
-    for (int i = 0; i < outputs; ++i) {
-      if (!used[index(i)]) continue;
-      Array<S, size> output{};
-      for (int j = 0; j <= i; ++j) output[index(first(j))] = apart(i, j);
-      const auto k = posterior_.correct(output, S(used_measurement_.variance(i) / growth_));
-      // Subtracts what the channels before have already explained.
-      for (int j = 0; j < i; ++j) {
-        S explained(0);
-        for (int l = 0; l <= i; ++l) explained += apart(i, l) * gain(first(l), j);
-        for (int r = 0; r < size; ++r) gain(r, j) -= k[index(r)] * explained;
-      }
-      for (int r = 0; r < size; ++r) gain(r, i) = k[index(r)];
-    }
-    gain_ = gain * apart;
-  }
-
-  bool freeze(const Covariance& noise) {
-    RiccatiModel<size, outputs, S> model;
-    model.transition = transition();
-    model.noise = detail::in_units(noise, root_units_.data());
-    model.measurement = measurement_.matrix() / growth_;
-    model.inflation = growth_;
-    Gain start = Gain::Zero();
-    for (int chain = 0; chain < outputs; ++chain) {
-      model.output(chain, first(chain)) = S(1);
-      const int last = first(chain) + order_of(chain) + Extension - 1;
-      if (!(growth_ > S(1)) && !(model.noise(last, last) > S(0))) return false;
-    }
-    // All poles at zero.
-    detail::unroll<outputs>([&](auto chain) {
-      constexpr int length = Orders::values[chain] + Extension;
-      const auto k = current_gain<length, S>(EqualSampledPoles<length, S>{S(1)}.weights());
-      for (int r = 0; r < length; ++r) start(first(chain) + r, int{chain}) = k[index(r)];
-    });
-    const auto covariance = riccati_covariance<size, outputs, S>(model, start);
-    if (!covariance) return false;
-    factor_ = Factor::nearest(*covariance);
-    // The recursion is run at the end, as for a single chain, because it is more accurate.
-    constexpr int most_steps = 2000;
-    Gain last = Gain::Zero();
-    for (int step = 0; step < most_steps; ++step) {
-      prepare_all();
-      if (!detail::all_finite(gain_)) return false;
-      const S change = detail::largest_magnitude(gain_ - last);
-      const bool done = !(change > S(2) * detail::rounding<S>() * detail::largest_magnitude(gain_));
-      last = gain_;
-      if (done && step > 3) break;
-      factor_ = posterior_;
-      factor_.advance_seldom(growth_, noise_, Transition{transition(), {}});
-    }
-    limit_ = factor_;
-    has_limit_ = true;
-    return true;
-  }
-
-  void stand() noexcept {
-    factor_ = limit_;
-    prepare_all();
-    standing_ = true;
-  }
-
-  void restart() noexcept {
-    corrected_ = false;
-    fresh_ = has_limit_;
-    if (has_limit_) {
-      stand();
-    } else {
-      factor_ = start_;
-      prepare_all();
-    }
-  }
-
   Estimate state_ = Estimate::Zero();  ///< scaled, x_r = T^r z_r / r! chain by chain
-  Gain gain_ = Gain::Zero();           ///< of the next correction, scaled
-  Factor factor_{};                    ///< of P-
-  Factor posterior_{};                 ///< of P after the next correction
-  Factor start_{};
-  Factor noise_{};
-  Factor limit_{};
-  CovarianceFactor<outputs, S> measurement_{};
-  CovarianceFactor<outputs, S> used_measurement_{};
+  detail::MimoRiccati<Orders, S, Extension> recursion_{};
   Matrix<S, outputs, Inputs> drive_;
   Estimate units_;       ///< T^r / r!
   Estimate root_units_;  ///< the same divided by the root of the unit of variances
@@ -749,13 +443,8 @@ class MimoExtendedStateFilter {
   Input input_ = Input::Zero();
   Output innovation_ = Output::Zero();
   S sample_time_;
-  S growth_{1};  ///< 1 + theta
   int max_gap_;
   Array<int, outputs> missed_{};  ///< predictions since the last correction
-  bool corrected_ = false;
-  bool fresh_ = false;  ///< no step since a reset to the limit
-  bool standing_ = false;
-  bool has_limit_ = false;
 };
 
 }  // namespace esokit

@@ -135,20 +135,10 @@ class PredictorCorrector {
       return StepStatus::ok;
     } else {
       const unsigned elapsed = this->elapsed();
-      if (elapsed > max_gap_ + 1u) [[unlikely]] {
-        if (!is_finite(y) || reset(y) != StepStatus::ok) return StepStatus::measurement_rejected;
-        return StepStatus::restarted;
-      }
-      Correction step{kept_.states};
-      if (!correct_levels<false>(step, y, elapsed) || !is_finite(probe(step.states))) {
-        // A finite but absurdly large u can lead to a prediction from which no good y recovers.
-        const bool state_is_to_blame =
-            is_finite(y) && detail::absolute(y) < detail::absolute(kept_.states[0][0]);
-        if (state_is_to_blame && reset(y) == StepStatus::ok) return StepStatus::restarted;
-        return StepStatus::measurement_rejected;
-      }
-      commit(step);
-      gap_ = 0;
+      const bool overdue = elapsed > max_gap_ + 1u;
+      if (overdue || !corrected(y, elapsed)) [[unlikely]]
+        return restart_from(y, overdue);
+      gap_ = up_to_date();
       return elapsed > 1 ? StepStatus::gap_bridged : StepStatus::ok;
     }
   }
@@ -200,8 +190,14 @@ class PredictorCorrector {
   [[nodiscard]] constexpr const S& innovation() const noexcept { return kept_.innovation; }
 
   /// Number of predictions since the last correction; 0 if up to date. 65535 if the state was too
-  /// large to be predicted: then the next good y restarts the observer.
-  [[nodiscard]] constexpr Lanes<int, S> missed() const noexcept { return gap_; }
+  /// large to be predicted: then the next good y restarts the observer. The count ends at 65533.
+  [[nodiscard]] constexpr Lanes<int, S> missed() const noexcept {
+    Lanes<int, S> missed = gap_;
+    for (int i = 0; i < (has_squares ? lane_count<S> : 0); ++i) {
+      if (detail::of_lane(gap_, i) == beyond_squares) detail::of_lane(missed, i) = 0;
+    }
+    return missed;
+  }
 
   /// The input that the last prediction used.
   [[nodiscard]] constexpr const S& applied_input() const noexcept { return kept_.applied_input; }
@@ -243,7 +239,9 @@ class PredictorCorrector {
   }
 
   /// True if so many samples are missing that the next `correct` restarts the observer.
-  [[nodiscard]] constexpr Lanes<bool, S> restarts() const noexcept { return gap_ > max_gap_ + 1u; }
+  [[nodiscard]] constexpr Lanes<bool, S> restarts() const noexcept {
+    return missed() > max_gap_ + 1;
+  }
 
   /// Call this between `predict` and `correct` if the actuator held `u_applied` instead of the u
   /// given to `predict`. Adds Gamma (u_applied - u_given) to the prediction. A u that is not
@@ -373,7 +371,7 @@ class PredictorCorrector {
       }
     }
     next.kept_ = kept_;
-    next.gap_ = gap_;
+    next.gap_ = missed() == 0 ? next.up_to_date() : gap_;
     for (State& state : next.kept_.states) state = next.model_.rescaled(state, model_);
     if (!next.model_.same_drive(model_)) {
       const S explained = (input_gain() - fresh.input_gain()) * kept_.applied_input;
@@ -394,7 +392,7 @@ class PredictorCorrector {
         model_(config.input_gain, config.sample_time),
         max_gap_(bridged(laws, config.max_gap)) {
     for (State& state : kept_.states) state.fill(S(0.0));
-    look_at_squares();
+    gap_ = up_to_date();
   }
 
   /// The same with a model from its own `make`. @param laws one for each level, or one law for one
@@ -403,7 +401,7 @@ class PredictorCorrector {
   PredictorCorrector(const Model& model, const Given& laws, int max_gap) noexcept
       : laws_{laws}, model_(model), max_gap_(static_cast<std::uint16_t>(max_gap)) {
     for (State& state : kept_.states) state.fill(S(0.0));
-    look_at_squares();
+    gap_ = up_to_date();
   }
 
   /// The rules for input_gain, sample_time and max_gap.
@@ -445,13 +443,7 @@ class PredictorCorrector {
     return true;
   }
   ESOKIT_INLINE bool predict_all(const S& u_applied) noexcept {
-    const LevelStates next = predicted_levels(u_applied);
-    if (!all(is_finite(probe(next)))) [[unlikely]]
-      return false;
-    count_missed();
-    kept_.states = next;
-    kept_.applied_input = u_applied;
-    return true;
+    return take_prediction(predicted_levels(u_applied), u_applied);
   }
   ESOKIT_INLINE bool correct_all(const S& y) noexcept {
     if (!(gap_ == 1 || gap_ == 0)) [[unlikely]]
@@ -460,7 +452,7 @@ class PredictorCorrector {
     if (!correct_levels<true>(next, y, 1u) || !all(is_finite(probe(next.states)))) [[unlikely]]
       return false;
     commit(next);
-    gap_ = 0;
+    gap_ = up_to_date();
     return true;
   }
   /// @endcond
@@ -477,7 +469,10 @@ class PredictorCorrector {
   }
 
   /// All data members, for derived classes.
-  static constexpr int data_members = 6;
+  static constexpr int data_members = 5;
+
+  /// True if `step` may be tried.
+  [[nodiscard]] ESOKIT_INLINE constexpr bool may_be_quick() const noexcept { return gap_ == 0; }
 
  private:
   friend struct detail::LaneAccess;
@@ -564,7 +559,10 @@ class PredictorCorrector {
   }
 
   /// Number of samples that the next correction bridges.
-  [[nodiscard]] constexpr unsigned elapsed() const noexcept { return gap_ > 1 ? gap_ : 1u; }
+  [[nodiscard]] constexpr unsigned elapsed() const noexcept {
+    const int gap = missed();
+    return gap > 1 ? static_cast<unsigned>(gap) : 1u;
+  }
 
   ESOKIT_INLINE constexpr void advance_laws() noexcept {
     detail::unroll<(gain_law_traits<Law>.advances ? Levels : 0)>(
@@ -622,27 +620,47 @@ class PredictorCorrector {
 
   /// If the sum of all squares is finite, so is the probe, unless 1/T is absurdly large. This test
   /// is cheaper, as squares need no absolute value and no weights. Not used for float with one
-  /// level, which would grow by the flag.
+  /// level and many states, where 1/T = 20 kHz would be too large, or in software, where a product
+  /// costs more than a magnitude.
   static constexpr bool has_squares = PlainScalar<LaneScalar<S>> && !records<S> &&
                                       model_traits<Model>.is_chain &&
-                                      (Levels > 1 || sizeof(LaneScalar<S>) > sizeof(float));
-  struct NoFlag {};
+                                      (Levels > 1 || (size <= 4 && detail::has_float_unit) ||
+                                       sizeof(LaneScalar<S>) > sizeof(float));
 
-  /// Sets the flag: true if states up to the root of the largest number are finite in physical
-  /// units, summed over all levels.
-  constexpr void look_at_squares() noexcept {
+  /// In the place of a gap of 0 if 1/T is too large for it: `step` is not tried.
+  static constexpr std::uint16_t beyond_squares = 65534;
+
+  /// A power of two. From this T on, states up to the root of the largest number are finite in
+  /// physical units, summed over all levels.
+  static constexpr auto least_time() noexcept {
+    using Lane = LaneScalar<S>;
+    Lane root(1);
+    for (int i = 1; i < std::numeric_limits<Lane>::max_exponent / 2; ++i) root = root * Lane(2);
+    Array<Lane, size> ones{};
+    ones.fill(Lane(1));
+    const auto suffice = [&](Lane rate) {
+      return ScaledChain<Order, Lane, Extension>::finite_probe(ones, rate) * Lane(Levels) < root;
+    };
+    Lane time(1);
+    while (!suffice(Lane(1) / time)) time = time * Lane(2);
+    while (suffice(Lane(2) / time)) time = time / Lane(2);
+    return time;
+  }
+
+  /// The gap after a correction.
+  [[nodiscard]] constexpr Lanes<std::uint16_t, S> up_to_date() const noexcept {
+    Lanes<std::uint16_t, S> gap{};
     if constexpr (has_squares) {
-      using Lane = LaneScalar<S>;
-      Lane root(1);
-      for (int i = 1; i < std::numeric_limits<Lane>::max_exponent / 2; ++i) root = root * Lane(2);
-      State ones;
-      ones.fill(S(1.0));
-      const S most = model_.finite_probe(ones) * detail::integer<S>(Levels);
-      for (int i = 0; i < lane_count<S>; ++i) {
-        const Lane of_lane = detail::number_of_lane(most, i);
-        detail::of_lane(squares_suffice_, i) = is_finite(of_lane) && of_lane < root;
+      constexpr auto least = least_time();
+      if (!all(sample_time() >= S(least))) [[unlikely]] {
+        for (int i = 0; i < lane_count<S>; ++i) {
+          if (!(detail::number_of_lane(sample_time(), i) >= least)) {
+            detail::of_lane(gap, i) = beyond_squares;
+          }
+        }
       }
     }
+    return gap;
   }
 
   /// True implies that `probe` is finite; false does not imply the opposite.
@@ -650,20 +668,11 @@ class PredictorCorrector {
       const LevelStates& states) const noexcept {
     if constexpr (has_squares) {
       S sum = detail::sum_of_squares(std::get<0>(states));
-      detail::unroll<Levels - 1>([&](auto i) ESOKIT_INLINE_LAMBDA {
-        sum = sum + detail::sum_of_squares(std::get<i + 1>(states));
-      });
-      return all(is_finite(sum));
+      detail::unroll<Levels - 1>(
+          [&](auto i) ESOKIT_INLINE_LAMBDA { detail::add_squares(sum, std::get<i + 1>(states)); });
+      return all(detail::is_finite_magnitude(sum));
     } else {
       return all(is_finite(probe(states)));
-    }
-  }
-
-  [[nodiscard]] ESOKIT_INLINE constexpr bool may_be_quick() const noexcept {
-    if constexpr (has_squares) {
-      return gap_ == 0 && squares_suffice_ == true;
-    } else {
-      return gap_ == 0;
     }
   }
 
@@ -732,24 +741,53 @@ class PredictorCorrector {
   }
 
   ESOKIT_INLINE constexpr void commit(const Correction& step) noexcept {
-    kept_.states = step.states;
     detail::assign(kept_.innovation, step.innovation);
+    detail::keep_stores_apart(kept_.states[0][0]);
+    kept_.states = step.states;
     detail::unroll<(gain_law_traits<Law>.accepts ? Levels : 0)>(
         [&](auto i) ESOKIT_INLINE_LAMBDA { laws_[i].accept(step.innovations[i]); });
   }
 
+  /// False, and nothing has changed, if the result is not finite. @param elapsed 1: no gap
+  constexpr bool corrected(S y, unsigned elapsed) noexcept {
+    Correction step{kept_.states};
+    if (!correct_levels<false>(step, y, elapsed) || !is_finite(probe(step.states))) return false;
+    commit(step);
+    return true;
+  }
+  /// After a gap that is not bridged, or if y cannot correct the state.
+  ESOKIT_COLD StepStatus restart_from(S y, bool overdue) noexcept {
+    // A finite but absurdly large u can lead to a prediction from which no good y recovers.
+    const bool due = overdue || detail::absolute(y) < detail::absolute(kept_.states[0][0]);
+    return is_finite(y) && due && reset(y) == StepStatus::ok ? StepStatus::restarted
+                                                             : StepStatus::measurement_rejected;
+  }
+  /// False, and nothing has changed, if the prediction is not finite.
+  ESOKIT_INLINE bool take_prediction(const LevelStates& next, const S& u) noexcept {
+    if (!all(is_finite(probe(next)))) [[unlikely]]
+      return false;
+    count_missed();
+    kept_.states = next;
+    kept_.applied_input = u;
+    return true;
+  }
+  ESOKIT_COLD LevelStates predicted_seldom(S u) const noexcept { return predicted_levels(u); }
+
   ESOKIT_COLD Status update_guarded(S y, S u_applied) noexcept {
+    const LevelStates before = kept_.states;
+    const LevelStates next = predicted_seldom(u_applied);
     if constexpr (has_squares) {
-      if (gap_ == 0) {  // perhaps only the squares overflowed
-        Correction step{predicted_levels(u_applied)};
-        if (correct_levels<true>(step, y, 1u) && is_finite(probe(step.states))) {
-          commit(step);
+      if (missed() == 0) {  // perhaps only the squares overflowed
+        kept_.states = next;
+        if (corrected(y, 1u)) {
           kept_.applied_input = u_applied;
           return StepStatus::ok;
         }
+        kept_.states = before;
       }
     }
-    const StepStatus predicted = predict_advanced(u_applied);
+    const StepStatus predicted =
+        take_prediction(next, u_applied) ? StepStatus::ok : predict_rejecting(u_applied);
     return predicted | correct(y);
   }
 
@@ -766,7 +804,8 @@ class PredictorCorrector {
   constexpr void count_missed() noexcept {
     for (int i = 0; i < lane_count<S>; ++i) {
       std::uint16_t& gap = detail::of_lane(gap_, i);
-      gap = static_cast<std::uint16_t>(gap + (gap < restart_due ? 1 : 0));
+      if (has_squares && gap == beyond_squares) gap = 0;
+      gap = gap < beyond_squares - 1 ? static_cast<std::uint16_t>(gap + 1) : restart_due;
     }
   }
 
@@ -780,7 +819,7 @@ class PredictorCorrector {
       gap_ = restart_due;
       return StepStatus::prediction_dropped;
     }
-    const LevelStates next = predicted_levels(kept_.applied_input);
+    const LevelStates next = predicted_seldom(kept_.applied_input);
     if (!is_finite(probe(next))) {
       // The state itself cannot be predicted, and perhaps never can again: the next y restarts the
       // observer.
@@ -800,7 +839,7 @@ class PredictorCorrector {
     if (!all(is_finite(probe(states)))) return StepStatus::state_rejected;
     kept_.states = states;
     kept_.innovation = S(0.0);
-    gap_ = 0;
+    gap_ = up_to_date();
     detail::unroll<(gain_law_traits<Law>.resets ? Levels : 0)>([&](auto i) { laws_[i].reset(); });
     return StepStatus::ok;
   }
@@ -815,7 +854,6 @@ class PredictorCorrector {
   Model model_;
   Lanes<std::uint16_t, S> gap_{};
   Lanes<std::uint16_t, S> max_gap_;
-  [[no_unique_address]] std::conditional_t<has_squares, Lanes<bool, S>, NoFlag> squares_suffice_{};
 
   // Last, because after a failed assertion the members below it would be missing in derived
   // classes.

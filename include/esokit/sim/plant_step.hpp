@@ -81,15 +81,11 @@ class InputQueue {
   std::size_t newest_ = 0;
 };
 
-/// Converts an error to the scalar of time; for a pack that of the lane.
+/// Converts an error to the scalar of time.
 template <class Time, class From>
 Error<Time> as_error(const Error<From>& error) {
-  return {error.field,
-          static_cast<Time>(esokit::detail::value_in_lane(error.value, error.lane)),
-          error.rule,
-          error.index,
-          static_cast<Time>(esokit::detail::value_in_lane(error.limit, error.lane)),
-          error.has_limit,
+  return {error.field, static_cast<Time>(error.value), error.rule,
+          error.index, static_cast<Time>(error.limit), error.has_limit,
           error.lane};
 }
 

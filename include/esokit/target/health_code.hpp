@@ -289,7 +289,7 @@ unsigned $name_diagnose(const $name_state *o)
 /// A controller that can be watched in C: its observer is on the chain, without Guarded.
 template <class C>
 concept WatchedController = WritableController<C> && requires(const C& c) {
-  requires model_traits<std::remove_cvref_t<decltype(in_adapters(c.observer()).model())>>
+  requires model_traits<std::remove_cvref_t<decltype(c.observer().model())>>
   .is_chain;
   requires !observer_traits<std::remove_cvref_t<decltype(c.observer())>>.schedules_input_gain;
 };

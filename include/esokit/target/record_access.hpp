@@ -274,8 +274,9 @@ struct RecordAccess {
         law.bracket_ = S(0.0);
         return nothing;
       });
-      add("anchor_take", {"power", "contraction"}, false,
-          [=](Law& law, const auto& in) { return law.anchor_take(in[0], in[1]), nothing; });
+      add("anchor_take", {"power", "contraction"}, false, [=](Law& law, const auto& in) {
+        return Law::anchor_take(law.power_, law.bracket_, in[0], in[1]), nothing;
+      });
       add("anchor_contraction", {"power", "contraction"}, true,
           [](Law&, const auto& in) { return S(in[1] + in[0] * in[1]); });
       add("anchor_power", {"power", "contraction"}, true,
@@ -401,33 +402,35 @@ struct RecordAccess {
   static GuardNumbers guard(const O& o) noexcept {
     using S = typename O::scalar_type;
     const bool bounds = o.limit_ < (std::numeric_limits<S>::max)();
+    const auto& set = o.set_;
+    const auto& now = o.weights_;
     const auto number = [](const S& x) { return static_cast<double>(x); };
     return {true,
             O::levels,
             bounds ? number(o.limit_) : 0.0,
-            number(o.leak_),
-            number(o.trust_),
-            number(o.bound_),
-            o.unit_ == DisturbanceUnit::input,
+            number(set.leak),
+            number(now.trust),
+            number(set.bound),
+            set.unit == DisturbanceUnit::input,
             number(o.configured_gain()),
-            number(o.inverse_gain_),
+            number(set.inverse_gain),
             number(o.gain_ratio_),
             number(o.told_ratio_),
             number(o.input_factor_),
-            number(o.weight_up_),
-            number(o.weight_down_),
-            o.release_samples_,
-            o.release_left_,
-            static_cast<unsigned>(o.settling_samples_),
-            static_cast<unsigned>(o.settling_left_),
-            static_cast<unsigned>(o.pin_),
-            o.side_ > 0   ? 1u
-            : o.side_ < 0 ? 2u
-                          : 0u,
-            o.held_,
-            o.unsettled_,
-            o.gated_,
-            o.frozen_};
+            number(now.up),
+            number(now.down),
+            set.release_samples,
+            now.release_left,
+            static_cast<unsigned>(set.settling_samples),
+            static_cast<unsigned>(now.settling_left),
+            static_cast<unsigned>(now.pin),
+            now.side > 0   ? 1u
+            : now.side < 0 ? 2u
+                           : 0u,
+            now.held,
+            now.unsettled,
+            now.gated,
+            now.frozen};
   }
 
   /// What Guarded does with the states on the chain: y of a prediction, a plant that stands at y

@@ -13,7 +13,7 @@
 #include <complex>
 #include <cstddef>
 #include <cstdio>
-#include <esokit/control/pid_conversion.hpp>
+#include <esokit/tune/pid_conversion.hpp>
 #include <esokit/tune/plain_pid.hpp>
 #include <esokit/tune/tune.hpp>
 #include <limits>

@@ -3,14 +3,14 @@
 #include <Eigen/LU>
 #include <cmath>
 #include <complex>
-#include <esokit/control/pid_conversion.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/gain/continuous_gain.hpp>
 #include <esokit/model/integrator_chain.hpp>
+#include <esokit/tune/pid_conversion.hpp>
 #include <limits>
 #include <support/refusal.hpp>
 
-namespace control_pid_conversion_test {
+namespace tune_pid_conversion_test {
 
 using esokit_test::refusal;
 
@@ -136,4 +136,4 @@ TEST(PidConversion, RefusedByName) {
             "observer_bandwidth: must be finite and positive");
 }
 
-}  // namespace control_pid_conversion_test
+}  // namespace tune_pid_conversion_test
