@@ -189,8 +189,12 @@
 #include <esokit/sim/trapezoid.hpp>
 #include <esokit/sim/window.hpp>
 #include <esokit/target/c_adapter_text.hpp>
+#include <esokit/target/c_angle_text.hpp>
 #include <esokit/target/c_code.hpp>
+#include <esokit/target/c_guard_text.hpp>
+#include <esokit/target/c_law_text.hpp>
 #include <esokit/target/c_text.hpp>
+#include <esokit/target/c_words.hpp>
 #include <esokit/target/fixed_bounds.hpp>
 #include <esokit/target/fixed_design.hpp>
 #include <esokit/target/fixed_point.hpp>
@@ -199,10 +203,13 @@
 #include <esokit/target/integer_list.hpp>
 #include <esokit/target/list_writer.hpp>
 #include <esokit/target/profile_code.hpp>
+#include <esokit/target/record_access.hpp>
 #include <esokit/target/recorded_design.hpp>
+#include <esokit/target/recorded_numbers.hpp>
 #include <esokit/target/recorder.hpp>
 #include <esokit/target/recording.hpp>
 #include <esokit/target/structured_text.hpp>
+#include <esokit/target/writable.hpp>
 #include <esokit/tune/controller.hpp>
 #include <esokit/tune/controller_source.hpp>
 #include <esokit/tune/families.hpp>
