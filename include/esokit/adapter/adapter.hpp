@@ -179,7 +179,9 @@ class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Ob
   /// @}
 
  protected:
+  /// @cond
   static constexpr int data_members = 1;  // see LaneAccess
+  /// @endcond
 
   /// Stores a copy.
   explicit constexpr Adapter(const Observer& observer) noexcept : observer_(observer) {}
