@@ -61,6 +61,44 @@ HandWritten2<S> hand_written() {
           .twice_rate = S(2e3)};
 }
 
+/// The loop around it with limits of u and of its rate.
+template <class S>
+struct HandWrittenAdrc2 {
+  HandWritten2<S> observer;
+  S w0, w1, w2, lower, upper, step, low, high;
+  S requested{}, last{};
+
+  ESOKIT_INLINE S update(const S& y, const S& r) noexcept {
+    observer.update(y, last);
+    S u = w0 * (r - observer.x0) - (w1 * observer.x1 + w2 * observer.x2);
+    if (const auto good = is_finite(u); !all(good)) u = select(good, u, last);
+    requested = u;
+    u = select(u < low, low, u);
+    u = select(high < u, high, u);
+    last = u;
+    const S below = u - step;
+    const S above = u + step;
+    low = select(below < lower, lower, below);
+    low = select(upper < low, upper, low);
+    high = select(upper < above, upper, above);
+    high = select(high < lower, lower, high);
+    return u;
+  }
+};
+
+template <class S>
+HandWrittenAdrc2<S> hand_written_adrc() {
+  return {.observer = hand_written<S>(),
+          .w0 = S(12.5),
+          .w1 = S(5e3),
+          .w2 = S(1e6),
+          .lower = S(-1e3),
+          .upper = S(1e3),
+          .step = S(1e2),
+          .low = S(-1e2),
+          .high = S(1e2)};
+}
+
 template <class S>
 LinearEso<2, S> linear() {
   return LinearEso<2, S>::make(
@@ -164,8 +202,11 @@ void add_all(const std::string& scalar) {
            Packed<CascadeEso<2, 3, One>>(cascade<One>()), lanes, false,
            beside("cascade_eso/2x3", ""));
     add<One>(bank + "adrc/2/" + scalar, adrc<One>(), lanes, false, "");
+    const std::string adrc_by_hand = bank + "hand_written_adrc/2/pack_of_" + scalar;
+    add<P>(adrc_by_hand, hand_written_adrc<P>(), lanes, false, "");
     add<P>(bank + "adrc/2/pack_of_" + scalar, Packed<Adrc<LinearEso<2, One>>>(adrc<One>()), lanes,
-           false, beside("adrc/2", ""));
+           false,
+           beside("adrc/2", "; vs " + adrc_by_hand + (lanes == 64 ? " <= 1.15" : " <= 1.30")));
   }
   // One of each that works on all lanes in its own way, and what goes lane by lane.
   const auto both = [&](const std::string& name, const auto& plain, const std::string& limit) {

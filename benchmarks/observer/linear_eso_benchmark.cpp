@@ -2,6 +2,7 @@
 /// LinearEso and CascadeEso beside hand-written code for the same maths and a dense Eigen observer.
 #include <array>
 #include <cmath>
+#include <esokit/analysis/integrator_chain.hpp>
 #include <esokit/control/adrc_law.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/observer/cascade_eso.hpp>
@@ -208,7 +209,9 @@ void add_all(const std::string& scalar) {
                   against("latency", name, limit)};
   };
   add<S>("cascade_eso/2x2/" + scalar, cascade<S, 2>(), linear_limits(""));
-  add<S>("cascade_eso/2x3/" + scalar, cascade<S, 3>(), linear_limits(" <= 2.5"));
+  // Three levels are three observers and the sums that join them: 54 operations beside 18, and more
+  // numbers than registers.
+  add<S>("cascade_eso/2x3/" + scalar, cascade<S, 3>(), linear_limits(" <= 3.3"));
 }
 
 }  // namespace

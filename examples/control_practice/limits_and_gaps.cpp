@@ -22,9 +22,9 @@
 #include <vector>
 
 #include <esokit/adapter/variable_time.hpp>
+#include <esokit/analysis/integrator_chain.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/eigen.hpp>
-#include <esokit/model/integrator_chain.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>

@@ -24,6 +24,7 @@
 #include <utility>
 #include <vector>
 
+#include <esokit/analysis/integrator_chain.hpp>
 #include <esokit/analysis/poles.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/gain/continuous_gain.hpp>

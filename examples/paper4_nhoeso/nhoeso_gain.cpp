@@ -18,6 +18,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <esokit/analysis/integrator_chain.hpp>
 #include <esokit/sim/continuous_observer.hpp>
 #include <numbers>
 #include <string>

@@ -20,6 +20,7 @@
 // EPADRC    filter_config          limit gain for sigma = 0.001, 0.01
 
 #include <Eigen/Dense>
+#include <esokit/analysis/integrator_chain.hpp>
 #include <esokit/eigen.hpp>
 #include <string>
 #include <vector>

@@ -19,6 +19,7 @@
 //          runs                 400
 
 #include <Eigen/Dense>
+#include <esokit/analysis/integrator_chain.hpp>
 #include <esokit/eigen.hpp>
 #include <string>
 #include <vector>

@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include <esokit/analysis/integrator_chain.hpp>
 #include <esokit/control/adrc_law.hpp>
 #include <esokit/control/predictive_adrc.hpp>
 #include <esokit/eigen.hpp>

@@ -20,6 +20,7 @@
 #include <esokit/analysis/error_bound.hpp>
 #include <esokit/analysis/frequency_response.hpp>
 #include <esokit/analysis/health_text.hpp>
+#include <esokit/analysis/integrator_chain.hpp>
 #include <esokit/analysis/linear_controller.hpp>
 #include <esokit/analysis/linear_system.hpp>
 #include <esokit/analysis/loop.hpp>
@@ -130,7 +131,6 @@
 #include <esokit/model/chain_model.hpp>
 #include <esokit/model/corrected_part.hpp>
 #include <esokit/model/disturbance_constant.hpp>
-#include <esokit/model/integrator_chain.hpp>
 #include <esokit/model/linear_plant.hpp>
 #include <esokit/model/matrix_model.hpp>
 #include <esokit/model/measured_input.hpp>
@@ -165,6 +165,7 @@
 #include <esokit/sim/elementary_signals.hpp>
 #include <esokit/sim/filtered_step.hpp>
 #include <esokit/sim/gaussian.hpp>
+#include <esokit/sim/held_plant.hpp>
 #include <esokit/sim/loop_steps.hpp>
 #include <esokit/sim/measure.hpp>
 #include <esokit/sim/metrics.hpp>

@@ -7,6 +7,7 @@
 #include <esokit/analysis/eigenvalues.hpp>
 #include <esokit/analysis/linear_system.hpp>
 #include <esokit/analysis/lyapunov.hpp>
+#include <esokit/analysis/lyapunov_matrix.hpp>
 #include <esokit/analysis/poles.hpp>
 #include <support/refusal.hpp>
 #include <vector>

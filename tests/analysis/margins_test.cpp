@@ -2,6 +2,7 @@
 // edge with the computed gain, phase or delay, and must not before.
 #include <gtest/gtest.h>
 #include <esokit/sim/continuous_observer.hpp>
+#include <esokit/sim/held_plant.hpp>
 
 #include <Eigen/Core>
 #include <cmath>

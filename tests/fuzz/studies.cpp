@@ -27,6 +27,7 @@
 #include <esokit/observer/nonlinear_eso.hpp>
 #include <esokit/sim/continuous_observer.hpp>
 #include <esokit/sim/disturbed_plant.hpp>
+#include <esokit/sim/held_plant.hpp>
 #include <esokit/sim/noise.hpp>
 #include <esokit/sim/plant.hpp>
 #include <esokit/sim/run.hpp>

@@ -3,9 +3,9 @@
 
 #include <cmath>
 #include <complex>
+#include <esokit/analysis/integrator_chain.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/gain/feedback_gain.hpp>
-#include <esokit/model/integrator_chain.hpp>
 #include <limits>
 #include <support/refusal.hpp>
 

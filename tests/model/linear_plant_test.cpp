@@ -6,6 +6,7 @@
 #include <complex>
 #include <esokit/core/pack.hpp>
 #include <esokit/model/linear_plant.hpp>
+#include <esokit/sim/held_plant.hpp>
 #include <limits>
 #include <string>
 #include <support/refusal.hpp>

@@ -8,6 +8,7 @@
 #include <esokit/control/adrc.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/model_eso.hpp>
+#include <esokit/sim/held_plant.hpp>
 #include <esokit/sim/run.hpp>
 #include <limits>
 

@@ -1,6 +1,7 @@
 // Identities of the linear observers: what equals what, and the equations of the paper written down
 // independently (K. Lakomy, R. Madonski, ISA Transactions 109 (2021), equations (23), (24)).
 #include <gtest/gtest.h>
+#include <esokit/analysis/integrator_chain.hpp>
 #include <esokit/gain/pole_set.hpp>
 #include <esokit/sim/continuous_observer.hpp>
 

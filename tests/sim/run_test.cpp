@@ -15,6 +15,7 @@
 #include <esokit/eigen.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/sim/filtered_step.hpp>
+#include <esokit/sim/held_plant.hpp>
 #include <esokit/sim/run.hpp>
 #include <limits>
 #include <string>

@@ -3,9 +3,9 @@
 #include <Eigen/LU>
 #include <cmath>
 #include <complex>
+#include <esokit/analysis/integrator_chain.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/gain/continuous_gain.hpp>
-#include <esokit/model/integrator_chain.hpp>
 #include <esokit/tune/pid_conversion.hpp>
 #include <limits>
 #include <support/refusal.hpp>

@@ -13,6 +13,18 @@
 
 namespace esokit {
 
+namespace detail {
+
+/// Sum of the magnitudes of `count` numbers; not finite if one of them is not.
+template <class T>
+constexpr T sum_of_magnitudes(const T* values, int count) noexcept {
+  T sum(0.0);
+  for (int i = 0; i < count; ++i) sum = sum + absolute(values[i]);
+  return sum;
+}
+
+}  // namespace detail
+
 /// D x = a x + b w, out = c x + d w. D is d/dt for a continuous system; for a sampled one it is the
 /// difference, D x = x[k+1] - x[k].
 ///

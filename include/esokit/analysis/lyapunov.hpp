@@ -12,6 +12,18 @@ namespace detail {
 
 // All matrices are n x n, column-major, in storage of the caller.
 
+/// out = a b', all n x n; `out` is neither of them.
+template <class T>
+constexpr void multiply_transposed(const T* a, const T* b, T* out, int n) noexcept {
+  for (int i = 0; i < n * n; ++i) out[i] = T(0.0);
+  for (int k = 0; k < n; ++k) {
+    for (int j = 0; j < n; ++j) {
+      const T factor = b[k * n + j];
+      for (int i = 0; i < n; ++i) out[j * n + i] = out[j * n + i] + a[k * n + i] * factor;
+    }
+  }
+}
+
 /// Largest row sum of a^2; its root has the size of the poles.
 inline double square_size(const double* a, double* work, int n) noexcept {
   multiply(a, a, work, n);

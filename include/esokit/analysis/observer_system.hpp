@@ -9,10 +9,10 @@
 #include <cmath>
 #include <concepts>
 #include <cstddef>
+#include <esokit/analysis/integrator_chain.hpp>
 #include <esokit/analysis/linear_system.hpp>
 #include <esokit/gain/sampled_gain.hpp>
 #include <esokit/model/chain_model.hpp>
-#include <esokit/model/integrator_chain.hpp>
 #include <esokit/model/sampled_model.hpp>
 #include <esokit/observer/concepts.hpp>
 #include <esokit/sim/continuous_observer.hpp>

@@ -30,17 +30,6 @@ template <class S, std::size_t Size>
   return sum;
 }
 
-/// x - k e with the elements of k from `First` on.
-template <int First, class S, std::size_t Size, std::size_t Count>
-[[nodiscard]] ESOKIT_INLINE constexpr std::array<S, Size> subtract_scaled(
-    const std::array<S, Size>& x, const std::array<S, Count>& k, const S& e) noexcept {
-  std::array<S, Size> rest;
-  unroll<Size>([&](auto r) ESOKIT_INLINE_LAMBDA {
-    std::get<r>(rest) = std::get<r>(x) - std::get<First + r>(k) * e;
-  });
-  return rest;
-}
-
 /// sum_i w_i x_i over `Count` elements, beginning with `First`.
 template <int First, int Count, class W, class X>
 [[nodiscard]] ESOKIT_INLINE constexpr auto weighed(const W& w, const X& x) noexcept {
@@ -60,13 +49,6 @@ template <int First, int Count, class W, class Observer>
     keep_scalar(sum);  // each estimate was stored alone
     sum = sum + std::get<First + i + 1>(w) * observer.template scaled_estimate<First + i + 1>();
   });
-  return sum;
-}
-
-/// sum + x_1 + x_2 + ..
-template <class S, std::size_t Size>
-[[nodiscard]] ESOKIT_INLINE constexpr S plus_all(S sum, const std::array<S, Size>& x) noexcept {
-  unroll<Size>([&](auto r) ESOKIT_INLINE_LAMBDA { sum = sum + std::get<r>(x); });
   return sum;
 }
 

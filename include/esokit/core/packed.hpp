@@ -173,14 +173,15 @@ class Packed : public detail::PackedTraits<
   /// @param config lane -> its Config @return the pack, or an error that names field and lane
   template <class Function>
   static Expected<Packed, Error<One>> make(const Function& config) {
-    return [&]<int... I>(std::integer_sequence<int, I...>)->Expected<Packed, Error<One>> {
-      const Array<Expected<T, Error<One>>, Lanes> made{T::make(config(I))...};
-      for (int i = 0; i < Lanes; ++i) {
-        if (const auto& one = made[static_cast<std::size_t>(i)]; !one) return of(one.error(), i);
-      }
-      return Packed([&](int i) -> const T& { return *made[static_cast<std::size_t>(i)]; });
+    const Expected<T, Error<One>> first = T::make(config(0));
+    if (!first) return of(first.error(), 0);
+    Packed all(*first);
+    for (int i = 1; i < Lanes; ++i) {
+      const Expected<T, Error<One>> one = T::make(config(i));
+      if (!one) return of(one.error(), i);
+      all.set(i, *one);
     }
-    (Indices{});
+    return all;
   }
 
   /// New settings while running: taken by all lanes or, on an error, by none.
@@ -231,20 +232,28 @@ class Packed : public detail::PackedTraits<
   template <class Function>
   constexpr auto each(const Function& f) noexcept {
     return detail::of_all_lanes<scalar_type>([&](int i) {
-      struct Changed {
-        Packed& all;
-        int i;
-        T lane = all[i];
-        ~Changed() { all.set(i, lane); }
-      } one{*this, i};
-      return f(one.lane, i);
+      if constexpr (at_once) {
+        struct Changed {
+          Packed& all;
+          int i;
+          T lane = all[i];
+          ~Changed() { all.set(i, lane); }
+        } one{*this, i};
+        return f(one.lane, i);
+      } else {
+        return f(form_.lanes[static_cast<std::size_t>(i)], i);
+      }
     });
   }
   template <class Function>
   [[nodiscard]] constexpr auto each(const Function& f) const noexcept {
     return detail::of_all_lanes<scalar_type>([&](int i) {
-      const T lane = (*this)[i];
-      return f(lane, i);
+      if constexpr (at_once) {
+        const T lane = (*this)[i];
+        return f(lane, i);
+      } else {
+        return f(form_.lanes[static_cast<std::size_t>(i)], i);
+      }
     });
   }
   /// @}
@@ -371,7 +380,7 @@ class Packed : public detail::PackedTraits<
       : form_([&] {
           if constexpr (at_once) {
             auto form = detail::blank<Form>();
-            (detail::set_lane(form, lane(I), I), ...);
+            for (int i = 0; i < Lanes; ++i) detail::set_lane(form, T(lane(i)), i);
             return form;
           } else {
             return Form{{lane(I)...}};

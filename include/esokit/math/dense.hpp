@@ -1,6 +1,6 @@
 /// @file
 /// Small dense kernels: linear equations, Cholesky factors, Lyapunov sums by doubling, the
-/// matrix exponential, symmetric eigenvalues. The controller headers use nothing else for matrices.
+/// matrix exponential. The controller headers use nothing else for matrices.
 ///
 /// They are plain loops on column-major storage of the caller, with the size as an argument, so
 /// that one instantiation serves all sizes. Each of Eigen's decompositions of fixed size costs
@@ -114,18 +114,6 @@ constexpr void multiply(const T* a, const T* b, T* out, N n) noexcept {
   }
 }
 
-/// out = a b', all n x n; `out` is neither of them.
-template <class T>
-constexpr void multiply_transposed(const T* a, const T* b, T* out, int n) noexcept {
-  for (int i = 0; i < n * n; ++i) out[i] = T(0.0);
-  for (int k = 0; k < n; ++k) {
-    for (int j = 0; j < n; ++j) {
-      const T factor = b[k * n + j];
-      for (int i = 0; i < n; ++i) out[j * n + i] = out[j * n + i] + a[k * n + i] * factor;
-    }
-  }
-}
-
 /// Largest row sum of magnitudes of a, n x n: the norm induced by the infinity norm of vectors.
 template <class T>
 constexpr T row_norm(const T* a, int n) noexcept {
@@ -136,14 +124,6 @@ constexpr T row_norm(const T* a, int n) noexcept {
     if (!(row <= largest)) largest = row;  // a NaN stays
   }
   return largest;
-}
-
-/// Sum of the magnitudes of `count` numbers; not finite if one of them is not.
-template <class T>
-constexpr T sum_of_magnitudes(const T* values, int count) noexcept {
-  T sum(0.0);
-  for (int i = 0; i < count; ++i) sum = sum + absolute(values[i]);
-  return sum;
 }
 
 /// P = sum_k A^k Q A'^k with A = I + e, that is P = A P A' + Q, by doubling (Smith's squared
@@ -224,39 +204,6 @@ constexpr Matrix<T, Size, Size> exp_minus_identity(Matrix<T, Size, Size> a) noex
   std::array<T, static_cast<std::size_t>(2 * Size * Size)> work{};
   exp_minus_identity(a.data(), work.data(), Size);
   return a;
-}
-
-/// Computes the eigenvalues of a symmetric a by Jacobi rotations: a becomes diagonal with the
-/// eigenvalues, the columns of v become the eigenvectors.
-inline void symmetric_eigenvalues(DenseView<double> a, DenseView<double> v) noexcept {
-  const int n = a.rows;
-  for (int i = 0; i < n; ++i) {
-    for (int j = 0; j < n; ++j) v(i, j) = i == j ? 1.0 : 0.0;
-  }
-  for (int sweep = 0; sweep < 40; ++sweep) {
-    bool rotated = false;
-    for (int p = 0; p < n; ++p) {
-      for (int q = p + 1; q < n; ++q) {
-        const double off = a(p, q);
-        if (!(absolute(off) > 1e-17 * (absolute(a(p, p)) + absolute(a(q, q))))) continue;
-        rotated = true;
-        const double ratio = (a(q, q) - a(p, p)) / (2.0 * off);
-        const double tangent =
-            (ratio < 0.0 ? -1.0 : 1.0) / (absolute(ratio) + std::sqrt(1.0 + ratio * ratio));
-        const double c = 1.0 / std::sqrt(1.0 + tangent * tangent);
-        const double s = tangent * c;
-        const auto rotate = [&](double& x, double& y) {
-          const double old = x;
-          x = c * old - s * y;
-          y = s * old + c * y;
-        };
-        for (int k = 0; k < n; ++k) rotate(a(k, p), a(k, q));
-        for (int k = 0; k < n; ++k) rotate(a(p, k), a(q, k));
-        for (int k = 0; k < n; ++k) rotate(v(k, p), v(k, q));
-      }
-    }
-    if (!rotated) return;
-  }
 }
 
 }  // namespace esokit::detail

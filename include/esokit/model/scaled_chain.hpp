@@ -3,10 +3,24 @@
 #pragma once
 
 #include <esokit/core/matrix.hpp>
+#include <esokit/core/scalar.hpp>
 #include <esokit/core/unroll.hpp>
-#include <esokit/model/integrator_chain.hpp>
+#include <esokit/math/combinatorics.hpp>
 
 namespace esokit {
+
+/// Sizes of a chain: the plant y^(Order) = d + b0 u with d modelled by `Extension` integrators.
+template <int Order, int Extension>
+struct ChainSize {
+  static constexpr int order = Order;             ///< n, order of the plant
+  static constexpr int extension = Extension;     ///< m, extended states
+  static constexpr int size = Order + Extension;  ///< N = n + m
+
+  // These come last, because Clang leaves out the declarations after a failed static_assert.
+  static_assert(Order >= 1, "esokit: the plant order must be at least 1");
+  static_assert(Extension >= 1, "esokit: at least one extended state is needed");
+  static_assert(Order + Extension <= 16, "esokit: order + extension above 16 is not supported");
+};
 
 /// States x_r = T^r z_r / r!, the Taylor coefficients of y over one sample (Nordsieck vector).
 ///

@@ -10,7 +10,7 @@
 #include <esokit/core/unroll.hpp>
 #include <esokit/gain/half_gain.hpp>
 #include <esokit/gain/nonlinear_gain_design.hpp>
-#include <esokit/model/integrator_chain.hpp>
+#include <esokit/model/scaled_chain.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/sim/continuous_gain_law.hpp>

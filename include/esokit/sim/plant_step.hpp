@@ -9,6 +9,7 @@
 #include <esokit/core/expected.hpp>
 #include <esokit/core/lanes.hpp>
 #include <esokit/model/linear_plant.hpp>
+#include <esokit/sim/held_plant.hpp>
 #include <esokit/sim/run_config.hpp>
 #include <esokit/sim/runge_kutta.hpp>
 #include <limits>
@@ -81,12 +82,14 @@ class InputQueue {
   std::size_t newest_ = 0;
 };
 
-/// Converts an error to the scalar of time.
+/// Converts an error to the scalar of time; of a pack its first lane.
 template <class Time, class From>
 Error<Time> as_error(const Error<From>& error) {
-  return {error.field, static_cast<Time>(error.value), error.rule,
-          error.index, static_cast<Time>(error.limit), error.has_limit,
-          error.lane};
+  const auto one = [](const From& x) {
+    return static_cast<Time>(esokit::detail::number_of_lane(x, 0));
+  };
+  return {error.field,      one(error.value), error.rule, error.index,
+          one(error.limit), error.has_limit,  error.lane};
 }
 
 /// The sample time T, or an error if it does not fit the controller.

@@ -2,8 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <esokit/analysis/integrator_chain.hpp>
 #include <esokit/eigen.hpp>
-#include <esokit/model/integrator_chain.hpp>
 #include <esokit/model/scaled_chain.hpp>
 #include <limits>
 #include <support/exact_plant.hpp>
@@ -12,7 +12,7 @@
 // The references compute in long double on purpose; the library above is still checked.
 #pragma GCC diagnostic ignored "-Wdouble-promotion"
 
-namespace model_integrator_chain_test {
+namespace analysis_integrator_chain_test {
 
 using esokit::EigenMatrix;
 using esokit::IntegratorChain;
@@ -190,4 +190,4 @@ TEST(ScaledChain, SurvivesSmallSampleTimesInFloat) {
   EXPECT_NEAR(Chain::physical(x, 1e4f)(8), 3.0f, 1e-5f);
 }
 
-}  // namespace model_integrator_chain_test
+}  // namespace analysis_integrator_chain_test
