@@ -209,7 +209,9 @@ void add_all(const std::string& scalar) {
                   against("latency", name, limit)};
   };
   add<S>("cascade_eso/2x2/" + scalar, cascade<S, 2>(), linear_limits(""));
-  add<S>("cascade_eso/2x3/" + scalar, cascade<S, 3>(), linear_limits(" <= 2.5"));
+  // Three levels are three observers and the sums that join them: 54 operations beside 18, and more
+  // numbers than registers.
+  add<S>("cascade_eso/2x3/" + scalar, cascade<S, 3>(), linear_limits(" <= 3.3"));
 }
 
 }  // namespace

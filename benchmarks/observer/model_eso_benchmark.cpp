@@ -21,15 +21,15 @@ Observer made(const typename Observer::PlantModel::Settings& model) {
 }
 
 /// Beside a chain of as many states; the best of its splits into order and extension is that with
-/// one extended state.
+/// one extended state. A chain has additions where a model has products.
 template <ModelParts Parts, class S>
 void add_parts(const std::string& name, const std::string& scalar,
                const typename AugmentedModel<Parts, S>::Settings& model) {
   using Observer = ModelEso<Parts, S>;
   const std::string base = "/linear_eso/" + std::to_string(Observer::size - 1) + "/" + scalar;
   add<S>(name + "/" + scalar, made<Observer, S>(model),
-         {"vs bank" + base + " <= 1.5", "vs call" + base + " <= 1.5",
-          "vs latency" + base + " <= 1.5"});
+         {"vs bank" + base + " <= 1.6", "vs call" + base + " <= 1.6",
+          "vs latency" + base + " <= 1.6"});
 }
 
 template <class S, int Order>
@@ -71,8 +71,9 @@ void add_all(const std::string& scalar) {
                    .value();
   using Eso = PlantEso<3, ModelParts{.order = 2}, S>;
   const std::string base = "/linear_eso/3/" + scalar;
+  // Its matrix is full.
   add<S>("linear_plant/3/" + scalar, made<Eso, S>({.plant = plant}),
-         {"vs bank" + base + " <= 1.5", "vs call" + base + " <= 1.5",
+         {"vs bank" + base + " <= 1.9", "vs call" + base + " <= 1.9",
           "vs latency" + base + " <= 1.5"});
 }
 

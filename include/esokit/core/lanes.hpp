@@ -190,7 +190,7 @@ struct LaneAccess {
 #undef ESOKIT_FOR_PACKS
 };
 
-struct RecordAccess;  // target/recorded_design.hpp: what is recorded apart
+struct RecordAccess;  // target/record_access.hpp
 
 /// A std::array or a Matrix.
 template <class T>

@@ -232,20 +232,28 @@ class Packed : public detail::PackedTraits<
   template <class Function>
   constexpr auto each(const Function& f) noexcept {
     return detail::of_all_lanes<scalar_type>([&](int i) {
-      struct Changed {
-        Packed& all;
-        int i;
-        T lane = all[i];
-        ~Changed() { all.set(i, lane); }
-      } one{*this, i};
-      return f(one.lane, i);
+      if constexpr (at_once) {
+        struct Changed {
+          Packed& all;
+          int i;
+          T lane = all[i];
+          ~Changed() { all.set(i, lane); }
+        } one{*this, i};
+        return f(one.lane, i);
+      } else {
+        return f(form_.lanes[static_cast<std::size_t>(i)], i);
+      }
     });
   }
   template <class Function>
   [[nodiscard]] constexpr auto each(const Function& f) const noexcept {
     return detail::of_all_lanes<scalar_type>([&](int i) {
-      const T lane = (*this)[i];
-      return f(lane, i);
+      if constexpr (at_once) {
+        const T lane = (*this)[i];
+        return f(lane, i);
+      } else {
+        return f(form_.lanes[static_cast<std::size_t>(i)], i);
+      }
     });
   }
   /// @}

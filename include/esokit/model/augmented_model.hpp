@@ -168,22 +168,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
 
   /// @name The parts of an estimate
   /// @{
-  /// The measured value: y as the sensor shows it.
-  [[nodiscard]] static constexpr S measured(const Estimate& z) noexcept {
-    return z(lf > 0 ? size - lf : 0);
-  }
   using Phasor = esokit::Phasor<S>;  ///< a sine by amplitude and phase
-  /// The sine of resonator 0 .. k - 1.
-  [[nodiscard]] static Phasor sinusoidal_disturbance(const Estimate& z, int resonator) noexcept
-      requires(Parts.resonators > 0) {
-    const int q = order + m + 2 * resonator;
-    return detail::phasor_of(z(q), z(q + 1));
-  }
-  /// The first-order disturbance 0 .. l - 1.
-  [[nodiscard]] static constexpr S first_order_disturbance(const Estimate& z, int part) noexcept
-      requires(Parts.first_order > 0) {
-    return z(order + m + 2 * Parts.resonators + part);
-  }
   /// d, the sum of all its parts, unit of y^(n).
   [[nodiscard]] S disturbance(const Estimate& z) const noexcept {
     S sum = constant(z);

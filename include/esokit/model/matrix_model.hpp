@@ -4,6 +4,7 @@
 
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/unroll.hpp>
+#include <esokit/model/model_parts.hpp>
 #include <esokit/model/sampled_model.hpp>
 
 namespace esokit {
@@ -27,8 +28,9 @@ struct ModelPattern {
 /// The members of a SampledModel, computed from Phi - I and Gamma without the elements that are
 /// always zero. The states are the scaled rows of the estimate, but in another order: those of a
 /// sensor come first.
-/// @tparam Shape `order`, `size`, `measured_rows` (states before y), `degree(state)`, and
-/// `pattern`, which elements are not zero
+/// @tparam Shape `parts`, `order`, `size`, `measured_rows` (states before y), `sinusoids` (first
+/// row of the estimate that belongs to a sine), `degree(state)`, and `pattern`, which elements are
+/// not zero
 template <class Shape, Scalar S>
 class MatrixModel {
  public:
@@ -73,6 +75,22 @@ class MatrixModel {
       std::get<i>(sum) = plus_element<i, column>(std::get<i>(sum), amount);
     });
     return sum;
+  }
+
+  /// The measured value in an estimate: y as the sensor shows it.
+  [[nodiscard]] static constexpr S measured(const Estimate& z) noexcept {
+    return z(measured_rows > 0 ? size - measured_rows : 0);
+  }
+  /// The sine of resonator 0 .. k - 1 in d.
+  [[nodiscard]] static Phasor<S> sinusoidal_disturbance(const Estimate& z, int resonator) noexcept
+      requires(Shape::parts.resonators > 0) {
+    const int q = Shape::sinusoids + 2 * resonator;
+    return detail::phasor_of(z(q), z(q + 1));
+  }
+  /// The first-order disturbance 0 .. l - 1 of d.
+  [[nodiscard]] static constexpr S first_order_disturbance(const Estimate& z, int part) noexcept
+      requires(Shape::parts.first_order > 0) {
+    return z(Shape::sinusoids + 2 * Shape::parts.resonators + part);
   }
 
   /// Place of a row of the estimate among the states: those of the sensor come first.

@@ -103,7 +103,9 @@ inline constexpr auto model_pattern = make_model_pattern<Parts>();
 /// The Shape that MatrixModel takes.
 template <ModelParts Parts>
 struct PartsShape {
+  static constexpr ModelParts parts = Parts;
   static constexpr int order = law_order(Parts);
+  static constexpr int sinusoids = order + Parts.constants;
   static constexpr int size = model_size(Parts);
   static constexpr int measured_rows = Parts.sensor;
   static constexpr int degree(int state) noexcept { return model_degree(Parts, state); }

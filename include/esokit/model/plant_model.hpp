@@ -133,10 +133,6 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
 
   /// @name The parts of an estimate
   /// @{
-  /// The measured value: y as the sensor shows it.
-  [[nodiscard]] static constexpr S measured(const Estimate& z) noexcept {
-    return z(lf > 0 ? size - lf : 0);
-  }
   /// x.
   [[nodiscard]] Vector<S, States> plant_state(const Estimate& z) const noexcept {
     const auto natural = natural_of(z);
@@ -153,16 +149,6 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
   }
   /// The constant (or polynomial) part of d.
   [[nodiscard]] S constant(const Estimate& z) const noexcept { return natural_of(z)(States); }
-  /// The sine of resonator 0 .. k - 1 in d.
-  [[nodiscard]] static Phasor<S> sinusoidal_disturbance(const Estimate& z, int resonator) noexcept
-      requires(Parts.resonators > 0) {
-    return detail::phasor_of(z(sinusoids + 2 * resonator), z(sinusoids + 2 * resonator + 1));
-  }
-  /// The first-order disturbance 0 .. l - 1 of d.
-  [[nodiscard]] static constexpr S first_order_disturbance(const Estimate& z, int part) noexcept
-      requires(Parts.first_order > 0) {
-    return z(sinusoids + 2 * Parts.resonators + part);
-  }
   /// @}
 
   /// The part of a correction that belongs to the disturbance: the one that leaves x unchanged.
@@ -230,7 +216,7 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
  private:
   friend struct detail::LaneAccess;
 
-  static constexpr int sinusoids = States + Parts.constants;  ///< first row of the sines
+  static constexpr int sinusoids = Shape::sinusoids;  ///< first row of the sines
   using Square = Matrix<S, inner, inner>;
 
   /// C adj(s I - A) E, whose roots are the zeros from d to y, and for each coefficient the sum of

@@ -14,7 +14,9 @@ namespace detail {
 /// plant, D takes the place of the first state of the disturbance.
 template <int States, ModelParts Parts>
 struct PlantShape {
+  static constexpr ModelParts parts = Parts;
   static constexpr int order = Parts.order;
+  static constexpr int sinusoids = States + Parts.constants;
   static constexpr int size = Parts.sensor + States + disturbance_size(Parts);
   static constexpr int measured_rows = Parts.sensor;
   static constexpr int first = size - disturbance_size(Parts);  ///< first disturbance state

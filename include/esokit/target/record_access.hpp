@@ -1,0 +1,581 @@
+/// @file
+/// RecordAccess: what is private in a controller and an observer, and is recorded apart.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <esokit/adapter/guarded.hpp>
+#include <esokit/control/control_loop.hpp>
+#include <esokit/core/scalar.hpp>
+#include <esokit/core/unroll.hpp>
+#include <esokit/gain/riccati_gain.hpp>
+#include <esokit/gain/sampled_gain.hpp>
+#include <esokit/model/sampled_model.hpp>
+#include <esokit/target/recorded_numbers.hpp>
+#include <esokit/target/recorder.hpp>
+#include <limits>
+#include <string>
+#include <tuple>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+namespace esokit {
+namespace detail {
+
+/// What is private in a controller and an observer, and is recorded apart.
+struct RecordAccess {
+  template <class C>
+  static auto& loop(C& c) noexcept {
+    return c.loop_;
+  }
+  /// u of the law for the present estimate, before the limits; as if no start hold were left.
+  template <class C, class S>
+  static S law(C& c, const S& reference) noexcept {
+    c.loop_.mode_ = LoopMode::running;
+    if constexpr (requires { c.judged(reference); }) {
+      return c.judged(reference);
+    } else {
+      return c.command(reference);
+    }
+  }
+  /// The output of the loop for a u that is wanted.
+  template <class Loop, class S>
+  static S limited(Loop& loop, const S& wanted) noexcept {
+    return loop.limited(wanted);
+  }
+  template <class C>
+  static bool softens(const C& c) noexcept {
+    if constexpr (requires { c.soft_; }) {
+      return c.soft_.on();
+    } else {
+      return false;
+    }
+  }
+  /// The law as designed again.
+  template <class C>
+  static void harden(C& c) noexcept {
+    if constexpr (requires { c.soft_; }) c.soft_.reset();
+  }
+  template <class Loop>
+  static LoopRules rules(const Loop& loop) noexcept {
+    return {loop.hold_left_,
+            loop.set_.missing_limit,
+            loop.set_.divider,
+            loop.set_.has_safe_input,
+            loop.set_.stay_safe,
+            static_cast<double>(loop.set_.hold_input),
+            static_cast<double>(loop.set_.safe_input)};
+  }
+
+  /// Gains, those of the law, and limits, with the beginning of their names. @param c a controller
+  /// or an observer
+  template <class Number, class C>
+  static void find_settings(C& c, std::vector<std::pair<const Number*, const char*>>& found) {
+    const auto take = [&](auto& part, const char* name) {
+      for (Number* one : numbers_of<Number>(part)) found.emplace_back(one, name);
+    };
+    if constexpr (requires { c.loop_; }) {
+      take(c.loop_.limiter_, "limit");
+      const Number* last = &c.loop_.limiter_.last();
+      std::erase_if(found, [last](const auto& one) { return one.first == last; });
+      if constexpr (requires { c.law_; }) {
+        take(c.law_, "law");
+        take(c.weights_, "law");
+      }
+      if constexpr (requires { c.gain_; }) take(c.gain_, "law");
+      find_settings(core(c.observer()), found);
+    } else if constexpr (requires { c.laws_; }) {
+      for (auto& law : c.laws_) take(law, "gain");
+    }
+  }
+
+  // ---- A controller in two phases.
+
+  /// The lists around which its text goes.
+  template <class Number, int Size, class Add>
+  static void add_phases(const Add& add) {
+    using Numbers = std::vector<Number>;
+    const auto armed = [](auto& c) {
+      (void)(all(is_finite(c.blind_)) && all(is_finite(c.offset_)) && all(is_finite(c.slope_)));
+      return Numbers{};
+    };
+    add("control_by", {"y"}, true,
+        [](auto& c, const auto& in) { return Numbers{c.control(in[0])}; });
+    add("control_blind", {}, true,
+        [](auto& c, const auto&) { return Numbers{c.control_without_measurement()}; });
+    add("refer", {"r"}, false, [](auto& c, const auto& in) {
+      for (Number& one : c.reference_) one = Number(0.0);
+      c.reference_[0] = in[0];
+      return Numbers{};
+    });
+    add("take_output", {"u"}, false, [](auto& c, const auto& in) {
+      c.output_ = in[0];
+      return Numbers{};
+    });
+    add("track", {}, false, [](auto& c, const auto&) {
+      c.limiter_.track(c.output_);
+      return Numbers{};
+    });
+    add("revise", {"u"}, false, [](auto& c, const auto& in) {
+      (void)c.observer_.revise_input(in[0]);
+      return Numbers{};
+    });
+    add("arm_restart", {}, false, [armed](auto& c, const auto&) {
+      using O = std::remove_cvref_t<decltype(c.observer_)>;
+      typename O::Preview next{};
+      for (Number& one : next.offset) one = Number(0.0);
+      next.slope = O::by_rows(O::standing(Number(1.0)));
+      c.look_ahead();
+      c.arm_by(next);
+      return armed(c);
+    });
+    add("arm_hold", {}, false, [](auto& c, const auto&) {
+      c.look_ahead();
+      c.settle_for(Number(0.0));
+      return Numbers{};
+    });
+    add("arm_blind", {}, false, [](auto& c, const auto&) {
+      c.look_ahead();
+      c.settle_for_blind();
+      return Numbers{};
+    });
+    std::vector<std::string> gains;
+    for (int i = 1; i <= Size; ++i) gains.push_back("k" + std::to_string(i));
+    add("arm_by", gains, false, [armed](auto& c, const auto& in) {
+      ScaledGain<Size, Number> gain{};
+      for (std::size_t i = 0; i < gain.size(); ++i) gain[i] = in[i];
+      c.look_ahead();
+      c.arm_by(gain);
+      return armed(c);
+    });
+  }
+  template <class C>
+  static unsigned hold_left(const C& c) noexcept {
+    return c.hold_left_;
+  }
+  template <class C>
+  static const auto& limiter(const C& c) noexcept {
+    return c.limiter_;
+  }
+  template <class C>
+  static auto& observer_of(C& c) noexcept {
+    return c.observer_;
+  }
+
+  /// The gain laws of all levels.
+  template <class O>
+  static auto laws(O& o) noexcept -> decltype((o.laws_)) {
+    return o.laws_;
+  }
+  /// A correction with gains from elsewhere, `gains[level][row]`.
+  template <class O, class S, class Gains>
+  static void correct(O& o, const S& y, const Gains& gains) noexcept {
+    typename O::Correction step{o.kept_.states};
+    const bool fine = o.correct_by(
+        step, y, [&](auto level, const S&) -> const auto& { return gains[std::size_t{level}]; });
+    if (fine && all(is_finite(o.probe(step.states)))) o.commit(step);
+  }
+
+  // ---- Laws that run.
+
+  template <class Law>
+  static constexpr RunningLaw kind_of = [] {
+    if constexpr (requires(Law law) { law.least_age_; }) {
+      return RunningLaw::schedule;
+    } else if constexpr (requires(Law law) { law.now_.factor; }) {
+      return RunningLaw::filter;
+    } else {
+      return RunningLaw::none;
+    }
+  }();
+  template <class O>
+  using LawOf = std::remove_cvref_t<decltype(std::declval<O&>().laws_[0])>;
+
+  // ---- A known model.
+
+  template <class O>
+  static constexpr bool knows = requires(O& o) {
+    o.rest_.inverse_gain;
+  };
+  /// The observer in a KnownModel, or the object itself.
+  template <class O>
+  static auto& core(O& o) noexcept {
+    if constexpr (knows<O>) {
+      return o.observer_;
+    } else {
+      return o;
+    }
+  }
+  /// The input of the observer in it for a u.
+  template <class O, class S>
+  static S driven(O& o, const S& u) noexcept {
+    return o.accepted(u);
+  }
+  /// At rest at y under u: `at` is y, u and, of an angle, y without whole turns. @param
+  /// around_angle see KnownNumbers
+  template <class O, class Numbers>
+  static void rest(O& o, const Numbers& at, [[maybe_unused]] bool around_angle) noexcept {
+    auto state = o.equilibrium(at[0], at[1]);
+    const bool wraps = at.size() > 2;
+    if constexpr (knows<O>) {
+      if (wraps && !around_angle) state(0) = at[2];
+      state = o.without_known(state);
+    }
+    if (wraps) state(0) = at[2];
+    (void)core(o).reset(state);
+  }
+
+  /// The law stands: no call moves it.
+  template <class O>
+  static O& at_rest(O& any) noexcept {
+    auto& o = core(any);
+    using Law = LawOf<std::remove_cvref_t<decltype(o)>>;
+    if constexpr (kind_of<Law> == RunningLaw::schedule) o.laws_[0].settled_ = true;
+    if constexpr (kind_of<Law> == RunningLaw::filter) o.laws_[0].since_ = std::int8_t{9};
+    return any;
+  }
+  template <class O>
+  static LawNumbers law_numbers(const O& o) noexcept {
+    LawNumbers numbers;
+    numbers.kind = kind_of<LawOf<O>>;
+    const auto& law = o.laws_[0];
+    if constexpr (kind_of<LawOf<O>> == RunningLaw::schedule) {
+      numbers.start = law.start_index_;
+      numbers.least_age = law.least_age_;
+      numbers.age = law.age_;
+      numbers.pending = law.pending_;
+      numbers.settled = law.settled_;
+      numbers.decay = static_cast<double>(law.decay_);
+      numbers.shift = static_cast<double>(law.shift_.contraction);
+      numbers.contraction = static_cast<double>(law.final_poles_.contraction);
+    } else if constexpr (kind_of<LawOf<O>> == RunningLaw::filter) {
+      numbers.since = static_cast<unsigned>(law.since_ & 127);
+      numbers.returns = law.mode_ != RiccatiMode::recursive;
+      numbers.settled = law.mode_ == RiccatiMode::frozen && law.stands();
+      numbers.watches = law.is_watched();
+    }
+    return numbers;
+  }
+  /// The lists around which its text goes. @param law a recorded law
+  template <class Law, class Add>
+  static void add_law(const Add& add) {
+    using S = typename Law::scalar_type;
+    if constexpr (kind_of<Law> == RunningLaw::schedule) {
+      constexpr int size =
+          std::tuple_size_v<std::remove_cvref_t<decltype(std::declval<Law>().gain_)>>;
+      using Poles = EqualSampledPoles<size, S>;
+      const auto nothing = S(0.0);
+      add("schedule_restart", {}, false,
+          [=](Law& law, const auto&) { return law.restart(), nothing; });
+      add("anchor_begin", {}, false, [=](Law& law, const auto&) {
+        law.power_ = S(1.0);
+        law.bracket_ = S(0.0);
+        return nothing;
+      });
+      add("anchor_take", {"power", "contraction"}, false, [=](Law& law, const auto& in) {
+        return Law::anchor_take(law.power_, law.bracket_, in[0], in[1]), nothing;
+      });
+      add("anchor_contraction", {"power", "contraction"}, true,
+          [](Law&, const auto& in) { return S(in[1] + in[0] * in[1]); });
+      add("anchor_power", {"power", "contraction"}, true,
+          [](Law& law, const auto& in) { return law.squared(in[0], in[1]); });
+      add("anchor_end", {"count"}, false, [=](Law& law, const auto& in) {
+        law.bracket_ = law.bracket(in[0], law.bracket_);
+        return nothing;
+      });
+      add("schedule_next", {}, false, [=](Law& law, const auto&) {
+        law.push();
+        law.set_gain();
+        return nothing;
+      });
+      add("schedule_settle", {}, false, [=](Law& law, const auto&) {
+        if (all(law.settled_below_ >= std::get<0>(law.ratios_u_))) law.stand();
+        return nothing;
+      });
+      add("present_poles", {}, true,
+          [](Law& law, const auto&) { return law.present_poles().contraction; });
+      add("joined_poles", {"a", "b"}, true,
+          [](Law&, const auto& in) { return Poles::joined(in[0], in[1]); });
+    } else if constexpr (kind_of<Law> == RunningLaw::filter) {
+      const auto nothing = S(0.0);
+      add("filter_corrected", {}, false,
+          [=](Law& law, const auto&) { return law.recur_usually(true), nothing; });
+      add("filter_missed", {}, false,
+          [=](Law& law, const auto&) { return law.recur_usually(false), nothing; });
+      add("filter_at_ceiling", {}, false, [=](Law& law, const auto&) {
+        if (all(!(law.now_.factor.variance(0) < law.ceiling()))) law.recur_at_ceiling();
+        return nothing;
+      });
+      add("filter_to_limit", {}, false, [=](Law& law, const auto&) {
+        if (law.now_.factor.near(law.limit_.factor, S(1e-3))) law.now_ = law.limit_;
+        return nothing;
+      });
+    }
+  }
+  /// u of the law for given estimates, where the observer does not always publish its own.
+  template <class C, class Numbers>
+  static auto law_for(C& c, const Numbers& in) noexcept {
+    auto& o = c.observer();
+    o.laws_[0].age_ = std::uint32_t{0};  // it publishes what it keeps
+    const auto kept = o.rest_.published;
+    std::size_t next = 1;
+    for (auto& given : o.rest_.published) given = in[next++];
+    const auto u = law(c, in[0]);
+    o.rest_.published = kept;
+    return u;
+  }
+  template <class O>
+  static constexpr bool blanks = requires(O& o) {
+    o.rest_.published;
+  };
+  /// An estimate as it is computed, whether it is published or not.
+  template <int Row, class O>
+  static auto estimate(const O& o) noexcept {
+    if constexpr (blanks<O>) {
+      return static_cast<const typename O::Base&>(o).template estimate<Row>();
+    } else {
+      return o.template estimate<Row>();
+    }
+  }
+  /// The place of a number among those that are published while estimates are blanked, or -1.
+  template <class O, class S>
+  static int place_in_published(const O& o, const S* at) noexcept {
+    int place = -1;
+    if constexpr (blanks<O>) {
+      for (std::size_t i = 0; i < o.rest_.published.size(); ++i) {
+        if (at == &o.rest_.published[i]) place = static_cast<int>(i);
+      }
+    }
+    return place;
+  }
+  /// Not written: a table of the first gains, a nominal model.
+  template <class O>
+  static constexpr bool is_plain = [] {
+    if constexpr (kind_of<LawOf<O>> == RunningLaw::filter) {
+      return LawOf<O>::table_size == 0 && !O::has_model;
+    } else {
+      return true;
+    }
+  }();
+  /// A y that the filter's gate accepts, as a check.
+  template <class O, class S>
+  static void judge(O& o, const S& y) noexcept {
+    const S e = y - o.predicted_measurement();
+    (void)all(e * e <= o.rest_.set.outlier_threshold * o.innovation_variance());
+  }
+
+  template <class O>
+  static WrapNumbers wrap(const O& o) noexcept {
+    using S = typename O::scalar_type;
+    const auto number = [](const S& x) { return static_cast<double>(x); };
+    WrapNumbers wrap;
+    wrap.period = number(o.period_);
+    wrap.inverse_period = number(o.inverse_period_);
+    wrap.most_turns = number(S(1) / (S(8) * rounding<S>()));
+    const auto counted = [&](const auto& c) {
+      return TurnNumbers{number(c.y), number(c.turns), number(c.motion), c.samples,
+                         c.gaps,      c.doubts,        c.begun};
+    };
+    wrap.count = counted(o.count_);
+    if constexpr (O::gated) {
+      wrap.gated = true;
+      wrap.heard = counted(o.heard_.count);
+      wrap.heard_at = o.heard_.at;
+      wrap.heard_steady = o.heard_.steady;
+      wrap.heard_rejected = o.heard_.rejected;
+    }
+    return wrap;
+  }
+
+  /// Whether it has a trust, and nothing but dhat itself to guard.
+  template <class O>
+  static constexpr bool guards_a_chain = [] {
+    if constexpr (requires { O::on_chain; }) {
+      return O::on_chain && O::gates;
+    } else {
+      return true;
+    }
+  }();
+  template <class O>
+  static GuardNumbers guard(const O& o) noexcept {
+    using S = typename O::scalar_type;
+    const bool bounds = o.limit_ < (std::numeric_limits<S>::max)();
+    const auto& set = o.set_;
+    const auto& now = o.weights_;
+    const auto number = [](const S& x) { return static_cast<double>(x); };
+    return {true,
+            O::levels,
+            bounds ? number(o.limit_) : 0.0,
+            number(set.leak),
+            number(now.trust),
+            number(set.bound),
+            set.unit == DisturbanceUnit::input,
+            number(o.configured_gain()),
+            number(set.inverse_gain),
+            number(o.gain_ratio_),
+            number(o.told_ratio_),
+            number(o.input_factor_),
+            number(now.up),
+            number(now.down),
+            set.release_samples,
+            now.release_left,
+            static_cast<unsigned>(set.settling_samples),
+            static_cast<unsigned>(now.settling_left),
+            static_cast<unsigned>(now.pin),
+            now.side > 0   ? 1u
+            : now.side < 0 ? 2u
+                           : 0u,
+            now.held,
+            now.unsettled,
+            now.gated,
+            now.frozen};
+  }
+
+  /// What Guarded does with the states on the chain: y of a prediction, a plant that stands at y
+  /// with the disturbance of each level, a disturbance in the unit of u under another b0.
+  /// @{
+  template <class O, class Numbers>
+  static auto predicted_y(const O& o, const Numbers& in) noexcept {
+    typename O::State x{};
+    for (std::size_t i = 0; i < x.size(); ++i) x[i] = in[i];
+    return o.model_.predict(x, o.model_.drive(in[x.size()]))[0];
+  }
+  template <class O, class Numbers>
+  static void stand_at(O& o, const Numbers& in) noexcept {
+    auto still = o.kept_.states;
+    std::size_t next = 1;
+    for (auto& level : still) {
+      for (auto& x : level) x = std::remove_cvref_t<decltype(x)>(0.0);
+      level[0] = in[0];
+      level[O::order] = in[next++];
+    }
+    (void)o.shift_to(still);
+  }
+  template <class O, class S>
+  static void scale_found(O& o, const S& change) noexcept {
+    auto scaled = o.kept_.states;
+    for (auto& level : scaled) level[O::order] = level[O::order] * change;
+    (void)o.shift_to(scaled);
+  }
+  /// @}
+  /// Where a load acts in the states of a model, which takes design work.
+  template <class O>
+  static auto load_column(const O& o) noexcept {
+    if constexpr (model_traits<typename O::PlantModel>.is_chain) {
+      return Empty{};
+    } else {
+      return o.model_.constant_column();
+    }
+  }
+  /// `shift_load` with it.
+  template <class O, class Column, class S>
+  static void load(O& o, const Column& column, const S& offset) noexcept {
+    if constexpr (std::is_same_v<Column, Empty>) {
+      (void)o.shift_load(offset);
+    } else {
+      auto next = o.kept_.states;
+      const S scaled = o.model_.scaled_constant(offset);
+      for (auto& state : next) {
+        for (std::size_t i = 0; i < column.size(); ++i) state[i] = state[i] + S(column[i]) * scaled;
+      }
+      (void)o.shift_to(next);
+    }
+  }
+  struct Empty {};
+  template <class O>
+  static MeasuredNumbers measured(const O& o) {
+    const auto number = [](const auto& x) { return static_cast<double>(x); };
+    MeasuredNumbers all{true, static_cast<unsigned>(o.most_lost_), number(o.told_), {}};
+    for (std::size_t w = 0; w < o.paths_.size(); ++w) {
+      const auto& path = o.paths_[w];
+      MeasuredPathNumbers numbers;
+      numbers.gain = number(path.input_.gain);
+      for (std::size_t i = 0; i < 2; ++i) {
+        numbers.share[i] = number(path.share_[i]);
+        numbers.late[i] = number(path.late_[i]);
+        numbers.reached[i] = number(path.reached_[i]);
+      }
+      for (int age = path.whole_ + 1; age >= 0; --age) {
+        numbers.memory.push_back(number(path.before(age)));
+      }
+      numbers.lagged = number(path.lagged_);
+      numbers.last = number(o.last_[w]);
+      numbers.lost = static_cast<unsigned>(o.lost_[w]);
+      all.paths.push_back(numbers);
+    }
+    return all;
+  }
+
+  /// What a monitor computes from its settings alone, and of the controller that it watches.
+  template <class M, class C>
+  static auto health(const M& m, const C& c) noexcept {
+    using S = typename M::scalar_type;
+    struct Numbers {
+      S weight, hair, largest_square, range, pole, slow, middle, least_against, least, step, forget;
+      S input_gain, of_noise;
+      int divider;
+    } numbers;
+    const S b = c.observer().input_gain();
+    numbers.range = absolute(b) * m.range_;
+    numbers.weight = m.weight_;
+    numbers.hair = static_cast<S>(1e-4) * m.range_;
+    numbers.largest_square = m.largest_square();
+    numbers.pole = m.pole_;
+    numbers.slow = m.slow_;
+    numbers.middle = b * m.middle(c.limiter());
+    numbers.least_against = m.larger(static_cast<S>(0.02) * numbers.range, S(3) * m.least_);
+    numbers.least = m.least_;
+    numbers.step = m.step_;
+    numbers.forget = m.forget_;
+    numbers.input_gain = b;
+    numbers.of_noise = m.health_.innovation_of_noise;
+    numbers.divider = m.divider_;
+    return numbers;
+  }
+
+  /// What a profile computes from its settings alone.
+  template <class P>
+  static auto profile(const P& p) noexcept {
+    using S = typename P::scalar_type;
+    struct Numbers {
+      std::array<S, P::order> limits{}, roots_of_limits{}, roots_of_peaks{};
+      S shortest_time, sample_time, longer;
+    } numbers;
+    for (int i = 1; i <= P::order; ++i) {
+      const auto row = static_cast<std::size_t>(i - 1);
+      numbers.limits[row] = p.config_.limits[row];
+      numbers.roots_of_limits[row] = p.root(p.config_.limits[row], i);
+      numbers.roots_of_peaks[row] = p.root(p.peak(i), i);
+    }
+    numbers.shortest_time = p.config_.shortest_time;
+    numbers.sample_time = p.config_.sample_time;
+    numbers.longer = p.longer;
+    return numbers;
+  }
+
+  /// The inputs of a DelayedInput that are still needed, the newest last.
+  template <class O>
+  static std::vector<double> line(const O& o) {
+    std::vector<double> inputs;
+    const int length = static_cast<int>(o.inputs_.size());
+    for (int age = o.delay_; age >= 0; --age) {
+      const int at = (o.newest_ - age + length) % length;
+      inputs.push_back(static_cast<double>(o.inputs_[static_cast<std::size_t>(at)]));
+    }
+    return inputs;
+  }
+  template <class O>
+  static GateNumbers gate(const O& o) noexcept {
+    return {static_cast<double>(o.threshold_),
+            static_cast<double>(o.running_factor_),
+            static_cast<double>(o.mean_),
+            o.most_in_a_row_,
+            o.count_,
+            o.open_};
+  }
+};
+
+}  // namespace detail
+}  // namespace esokit
