@@ -208,6 +208,7 @@
 #include <esokit/target/recorded_numbers.hpp>
 #include <esokit/target/recorder.hpp>
 #include <esokit/target/recording.hpp>
+#include <esokit/target/st_translator.hpp>
 #include <esokit/target/structured_text.hpp>
 #include <esokit/target/writable.hpp>
 #include <esokit/tune/controller.hpp>

@@ -108,6 +108,24 @@ TEST(CKnown, RefusesBadNumbersUnderFastMath) {
   refuses_under_fast_math<Adrc<DelayedInput<Known<CascadeEso<1, 2, double>>, 3>>>();
 }
 
+TEST(CKnown, NamesWhatTheLibraryComputes) {
+  const auto header = [](const auto& observer) { return to_c(observer)->header; };
+  const std::string told = "bit for bit,\n * where the C library has the same ";
+  using Sine = Known<LinearEso<2, float>>;
+  using None = KnownModel<LinearEso<1, double>, Friction<0, double>>;
+  const std::string sine = header(Sine::make(observer_config<Sine>(8)).value());
+  const std::string none = header(None::make(observer_config<None>(8)).value());
+  EXPECT_NE(sine.find(told + "sinf. */"), std::string::npos) << sine;
+  EXPECT_NE(none.find("bit for bit. */"), std::string::npos) << none;
+}
+
+TEST(CKnown, RefusesASoftenedLawOfAnAngle) {
+  using Softened = Adrc<WrappedOutput<Known<LinearEso<3, double>>>>;
+  const auto code = to_c(Softened::make(config<Softened>(8)).value());
+  ASSERT_FALSE(code);
+  EXPECT_STREQ(code.error().field, "soften");
+}
+
 TEST(CKnown, AdoptsSettings) {
   if (!there("gcc")) GTEST_SKIP() << "no gcc";
   adopts<Adrc<Known<LinearEso<2, double>>>>(1201);

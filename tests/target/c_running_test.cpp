@@ -89,6 +89,35 @@ TEST(CRunning, OfAnglesByTurnsAroundAGate) {
       });
 }
 
+/// A prediction that is off by more turns than the scalar can hold restarts, which opens the gate.
+TEST(CRunning, OpensTheGateWhereAnAngleRestarts) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  using Observer = WrappedOutput<OutlierGate<LinearEso<2, double>>>;
+  auto settings = observer_config<Observer>(8);
+  innermost(settings).sample_time = 1;
+  innermost(settings).observer_bandwidth = 0.5;
+  auto observer = Observer::make(settings).value();
+  const Folder folder;
+  InC<double> in_c(folder, to_c(observer, {.name = "loop"}).value(), false);
+  ASSERT_TRUE(in_c.loaded());
+  const auto both = [&](auto mine, unsigned its) { EXPECT_EQ(static_cast<unsigned>(mine), its); };
+  int opened = 0;
+  for (double u = 1e306; u < 5e307; u *= 1.2) {
+    both(observer.reset(0.3), in_c.reset(0.3));
+    for (int k = 0; k < 40; ++k) both(observer.update(0.3, 0), in_c.observe(0.3, 0));
+    const bool closed = !observer.observer().open();
+    for (int k = 0; k < 5; ++k) {  // fewer than the gate takes for a restart
+      const double held = k == 0 ? u : 0.0;
+      both(observer.predict(held), in_c.predict(held));
+    }
+    both(observer.correct(0.3), in_c.correct(0.3));
+    opened += closed && observer.observer().open();
+    both(observer.update(1, 0), in_c.observe(1, 0));
+    compare_estimates(observer, in_c, 0);
+  }
+  EXPECT_GT(opened, 0);
+}
+
 TEST(CRunning, OfGuards) {
   if (!there("gcc")) GTEST_SKIP() << "no gcc";
   equals<Guarded<LinearEso<2, double>>>(30000, 601);

@@ -179,7 +179,7 @@ class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Ob
   /// @}
 
  protected:
-  static constexpr int data_members = 1;  // see LaneAccess
+  static constexpr int data_members = 1;  ///< of this base
 
   /// Stores a copy.
   explicit constexpr Adapter(const Observer& observer) noexcept : observer_(observer) {}

@@ -372,12 +372,10 @@ class Adrc {
       // Apart from the first term, so that both are computed in parallel.
       const S rest = detail::weighed_estimates<1, order>(weights_, observer());
       const S x = observer().template scaled_estimate<0>();
-      if constexpr (error_based) {
-        return detail::by_present_gain(observer(), S(weights_[0] * x + rest));
-      } else {
-        const S error = detail::wrapped(observer(), S(reference - x));
-        return detail::by_present_gain(observer(), S(weights_[0] * error - rest));
-      }
+      const S u = error_based
+                      ? S(weights_[0] * x + rest)
+                      : S(weights_[0] * detail::wrapped(observer(), S(reference - x)) - rest);
+      return detail::by_present_gain(observer(), u);
     } else {
       return command(Reference(reference).all());
     }

@@ -77,9 +77,7 @@ class MatrixModel {
     return sum;
   }
 
-  /// @name The parts of an estimate
-  /// @{
-  /// The measured value: y as the sensor shows it.
+  /// The measured value in an estimate: y as the sensor shows it.
   [[nodiscard]] static constexpr S measured(const Estimate& z) noexcept {
     return z(measured_rows > 0 ? size - measured_rows : 0);
   }
@@ -94,7 +92,6 @@ class MatrixModel {
       requires(Shape::parts.first_order > 0) {
     return z(Shape::sinusoids + 2 * Shape::parts.resonators + part);
   }
-  /// @}
 
   /// Place of a row of the estimate among the states: those of the sensor come first.
   [[nodiscard]] static constexpr int state_of_row(int row) noexcept {

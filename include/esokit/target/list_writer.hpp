@@ -1,6 +1,5 @@
 /// @file
-/// Recorded calls as lines of any language: the names and expressions of to_c and
-/// to_structured_text.
+/// Recorded calls as lines of a language: the names and expressions of to_c.
 #pragma once
 
 #include <array>
@@ -31,56 +30,19 @@ inline std::string filled(std::string text, const Words& words) {
 struct Language {
   const char* real[2];             ///< double, float
   const char* number_suffix[2];    ///< of a constant
-  const char* most[2];             ///< the largest number
   const char* from_state;          ///< before the name of a number of the object
-  char exponent;                   ///< between mantissa and exponent
   std::array<const char*, 26> of;  ///< each Operation
 };
 
 inline constexpr Language c_language{
     {"double", "float"},
     {"", "f"},
-    {"", ""},
     "o->",
-    'e',
     {"",          "",           "$a + $b",    "$a - $b",       "$a * $b",       "$a / $b",
      "-$a",       "fabs$f($a)", "sqrt$f($a)", "pow$f($a, $b)", "exp$f($a)",     "expm1$f($a)",
      "sin$f($a)", "cos$f($a)",  "tan$f($a)",  "atan$f($a)",    "tanh$f($a)",    "$a ? $b : $c",
      "$a < $b",   "$a > $b",    "$a <= $b",   "$a >= $b",      "is_finite($a)", "$a && $b",
      "$a || $b",  "!$a"}};
-
-/// IEC 61131-3. ABS(x) <= the largest number is false for NaN and infinity.
-inline constexpr Language st_language{{"LREAL", "REAL"},
-                                      {"", ""},
-                                      {"1.7976931348623157E+308", "3.40282347E+38"},
-                                      "",
-                                      'E',
-                                      {"",
-                                       "",
-                                       "$a + $b",
-                                       "$a - $b",
-                                       "$a * $b",
-                                       "$a / $b",
-                                       "-$a",
-                                       "ABS($a)",
-                                       "SQRT($a)",
-                                       "EXPT($a, $b)",
-                                       "EXP($a)",
-                                       "EXP($a) - 1.0",
-                                       "SIN($a)",
-                                       "COS($a)",
-                                       "TAN($a)",
-                                       "ATAN($a)",
-                                       "1.0 - 2.0 / (EXP(2.0 * $a) + 1.0)",
-                                       "SEL($a, $c, $b)",
-                                       "$a < $b",
-                                       "$a > $b",
-                                       "$a <= $b",
-                                       "$a >= $b",
-                                       "ABS($a) <= $most",
-                                       "$a AND $b",
-                                       "$a OR $b",
-                                       "NOT $a"}};
 
 /// A recorded call with names.
 struct NamedCall {
@@ -115,7 +77,6 @@ class ListWriter {
 
   [[nodiscard]] std::string real() const { return language_->real[single_ ? 1 : 0]; }
   [[nodiscard]] bool single() const { return single_; }
-  [[nodiscard]] std::string most() const { return language_->most[single_ ? 1 : 0]; }
   /// The number, read back bit for bit.
   [[nodiscard]] std::string number(double value) const {
     char digits[40];
@@ -123,7 +84,6 @@ class ListWriter {
     std::string text = digits;
     const std::size_t power = text.find('e');
     if (power != std::string::npos) {
-      text[power] = language_->exponent;
       if (text.find('.') == std::string::npos) text.insert(power, ".0");
     } else if (text.find('.') == std::string::npos) {
       text += ".0";
@@ -168,9 +128,8 @@ class ListWriter {
     }
   }
 
-  /// The lines of a call. @param prefix before each temporary, where they share a scope
-  [[nodiscard]] WrittenCall written(const NamedCall& names, const RecordedCall& call,
-                                    const std::string& prefix = "") const {
+  /// The lines of a call.
+  [[nodiscard]] WrittenCall written(const NamedCall& names, const RecordedCall& call) const {
     const auto& list = call.list.instructions;
     const auto need = needed(call);
     const std::vector<int> uses = counted(call, need);
@@ -212,7 +171,6 @@ class ListWriter {
       }
       const std::string expression = filled(language_->of[static_cast<std::size_t>(one.operation)],
                                             {{"$f", single_ ? "f" : ""},
-                                             {"$most", most()},
                                              {"$a", part(one.a)},
                                              {"$b", part(one.b)},
                                              {"$c", part(one.c)}});
@@ -222,9 +180,9 @@ class ListWriter {
         continue;
       }
       for (std::size_t m = 0; m < live.size() && of[i].empty(); ++m) {
-        if (live[m] && call.next[m] == static_cast<int>(i)) of[i] = prefix + members[m] + "_next";
+        if (live[m] && call.next[m] == static_cast<int>(i)) of[i] = members[m] + "_next";
       }
-      if (of[i].empty()) of[i] = prefix + "t" + std::to_string(++temporaries);
+      if (of[i].empty()) of[i] = "t" + std::to_string(++temporaries);
       text.lines.push_back({of[i], expression, is_condition(one.operation)});
     }
     for (std::size_t i = 0; i < given.size(); ++i) {

@@ -11,6 +11,7 @@
 #include <esokit/target/c_text.hpp>
 #include <esokit/target/list_writer.hpp>
 #include <esokit/target/recorded_design.hpp>
+#include <esokit/target/structured_text.hpp>
 #include <string>
 #include <vector>
 
@@ -282,6 +283,38 @@ Expected<CCode, Error<S>> to_c(const SmoothProfile<Order, S>& profile,
   return CCode{
       detail::filled(detail::c_profile_header, words),
       detail::filled(std::string(detail::c_source_head) + detail::c_profile_source, words)};
+}
+
+/// A profile as a function block in Structured Text, a call of which is a sample: its C,
+/// translated. The cube root that a limited third derivative needs is EXPT: such a move may take a
+/// sample more or less. @param profile as for to_c @return the text, or an error as for to_c
+template <int Order, PlainScalar S>
+Expected<std::string, Error<S>> to_structured_text(const SmoothProfile<Order, S>& profile,
+                                                   const CodeOptions& options = {}) {
+  const auto code = to_c(profile, options);
+  if (!code) return code.error();
+  detail::StBlock block(*code, options, sizeof(S) == sizeof(float), "_init");
+  block.input("target : $real", "of the next move, or where it rests");
+  block.input("resets : BOOL", "TRUE: is at rest at target");
+  block.output("good : BOOL", "FALSE: target is not finite or too far");
+  block.output("moves : BOOL");
+  block.own("motion : $name_numbers_" + std::to_string(Order + 1));
+  block.body =
+      "IF resets THEN\n  good := $name_reset(o := o, value := target);\nELSE\n"
+      "  good := $name_update(o := o, target := target);\nEND_IF;\n"
+      "moves := $name_moves(o := o);\ndone := $name_motion(o := o, motion := motion);\n";
+  for (int i = 0; i <= Order; ++i) {
+    const std::string r = i == 0 ? "r" : "r" + std::to_string(i);
+    block.output(r + " : $real", i == 0 ? "the reference" : "its derivative");
+    block.body += r + " := motion[" + std::to_string(i) + "];\n";
+  }
+  const detail::StructuredText all = block.text(
+      "(* Written by esokit from a finished profile; do not edit.\n$COMMENT   FUNCTION_BLOCK $name "
+      "is at the end: call it once in each T = " +
+      detail::ListWriter(detail::c_language, false)
+          .number(static_cast<double>(detail::RecordAccess::profile(profile).sample_time)) +
+      " s. *)\n\n");
+  return all.template expected<S>(all.text);
 }
 
 }  // namespace esokit

@@ -27,7 +27,7 @@ Expected<TunedCode, Error<double>> tuned_code(const TuneModel& model, const Tune
   const auto made = with_controller<Order, S>(model, design, [&](const auto& controller) {
     const auto recorded = detail::recorded_design(controller, options);
     if (recorded) {
-      code = TunedCode{detail::c_code(*recorded), detail::structured_text(*recorded)};
+      code = TunedCode{detail::c_code(*recorded), detail::structured_text(*recorded).text};
     } else {
       code = detail::as_double(recorded.error());
     }
