@@ -89,10 +89,10 @@ TEST(MissingMost, TheLargestIsCounted) {
     settings.observer.max_gap = 65000;
     settings.observer.observer_bandwidth = 10;  // bridges 1000 samples
     settings.measurement_divider = divider;
-    settings.missing.most = 65535 / divider;
+    settings.missing.most = 65534 / divider;
     const auto refused = Adrc<LinearEso<2>>::make(settings);
-    ASSERT_EQ(refusal(refused), "missing.most: must be 0 up to 65535 samples, that is");
-    EXPECT_EQ(refused.error().limit, 65535 / divider - 1);
+    ASSERT_EQ(refusal(refused), "missing.most: must be 0 up to 65534 samples, that is");
+    EXPECT_EQ(refused.error().limit, 65534 / divider - 1);
     --settings.missing.most;
     auto controller = Adrc<LinearEso<2>>::make(settings).value();
     controller.update(0, 0.0);

@@ -604,9 +604,9 @@ TEST(Adrc, BadConfigIsRefusedByName) {
             }),
             "missing.input: must not be below limits.lower");
   EXPECT_EQ(field([](auto& c) { c.missing.most = -1; }),
-            "missing.most: must be 0 up to 65535 samples, that is");
+            "missing.most: must be 0 up to 65534 samples, that is");
   EXPECT_EQ(field([](auto& c) { c.missing.most = 65535; }),
-            "missing.most: must be 0 up to 65535 samples, that is");
+            "missing.most: must be 0 up to 65534 samples, that is");
   EXPECT_EQ(field([](auto& c) { c.measurement_divider = 0; }),
             "measurement_divider: must be 1 .. 1000");
   EXPECT_EQ(field([](auto& c) { c.measurement_divider = 101; }),

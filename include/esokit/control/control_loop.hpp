@@ -25,7 +25,7 @@ struct StartHold {
 template <Scalar S = double>
 struct MissingRule {
   int most = 50;  ///< missing measurements in a row that the controller bridges, 0 up to
-                  ///< 65535 / measurement_divider - 1
+                  ///< 65534 / measurement_divider - 1
   std::optional<S>
       input{};        ///< u in safe mode, approached within the rate limit; left out: the last u
   bool stay = false;  ///< true: safe mode lasts until start(); false: until a measurement
@@ -85,11 +85,11 @@ Expected<CheckedLoop<S>, Error<S>> check_loop(const LoopSettings<S>& settings, S
       .require(divider == 1 || bears_gaps, "measurement_divider", counted,
                "must be 1: regular gaps restart this observer");
   if (!rules) return rules.error();
-  // The observer counts missing samples up to 65535.
-  const int most = 65535 / divider - 1;
+  // The observer counts missing samples up to 65533.
+  const int most = 65534 / divider - 1;
   rules.require(0 <= settings.missing.most && settings.missing.most <= most,
                 {"missing.most", static_cast<S>(settings.missing.most),
-                 "must be 0 up to 65535 samples, that is", -1, static_cast<S>(most), true});
+                 "must be 0 up to 65534 samples, that is", -1, static_cast<S>(most), true});
   if (!rules) return rules.error();
   return CheckedLoop<S>{*limiter, static_cast<std::uint32_t>(samples)};
 }
