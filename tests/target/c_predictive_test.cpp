@@ -176,10 +176,21 @@ TEST(CPredictive, OfACascade) {
   predicts<PredictiveAdrc<ModelCascadeEso<lag, 2, double>>>(951);
 }
 
+inline constexpr ModelParts shown{.order = 1, .sensor = 1};
+template <class V, class Model = AugmentedModel<shown, V>>
+using FilterOfASensor =
+    ExtendedStateFilter<Model::order, V, Model::extension, NoNominalModel, 0, Model>;
+
 /// A sensor in the model: y is not its first state.
 TEST(CPredictive, OfASensor) {
   if (!there("gcc")) GTEST_SKIP() << "no gcc";
   predicts<PredictiveAdrc<ModelEso<everything, double>>>(961);
+  predicts<PredictiveAdrc<ModelCascadeEso<everything, 2, float>>>(971);
+  predicts<PredictiveAdrc<FilterOfASensor<double>>>(981, [](auto& settings) {
+    settings.observer.plant_model.sensor.time_constant = 0.03;
+    settings.observer.disturbance_bounds = {0, 0.5, 0};
+    settings.observer.outlier_threshold = 25;
+  });
 }
 
 template <class C>
