@@ -119,7 +119,7 @@ void add_order(const std::string& scalar, const Limits& recursive, const Limits&
 template <class S>
 void add_all(const std::string& scalar) {
   add_order<S, 1>(scalar, {}, {});
-  // Two divisions and some 90 operations beside 18.
+  // The recursion: 213 instructions beside 33 on a Cortex-M4F, with divisions.
   add_order<S, 2>(scalar, {" <= 9", " <= 9", " <= 9"}, {" <= 1.1", " <= 1.1", " <= 1.1"});
   add_order<S, 3>(scalar, {}, {});
 }

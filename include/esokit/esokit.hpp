@@ -196,11 +196,15 @@
 #include <esokit/target/c_text.hpp>
 #include <esokit/target/c_words.hpp>
 #include <esokit/target/fixed_bounds.hpp>
+#include <esokit/target/fixed_builder.hpp>
 #include <esokit/target/fixed_design.hpp>
+#include <esokit/target/fixed_options.hpp>
 #include <esokit/target/fixed_point.hpp>
+#include <esokit/target/fixed_record.hpp>
 #include <esokit/target/fixed_text.hpp>
 #include <esokit/target/health_code.hpp>
 #include <esokit/target/integer_list.hpp>
+#include <esokit/target/linear_call.hpp>
 #include <esokit/target/list_writer.hpp>
 #include <esokit/target/profile_code.hpp>
 #include <esokit/target/record_access.hpp>
@@ -208,6 +212,8 @@
 #include <esokit/target/recorded_numbers.hpp>
 #include <esokit/target/recorder.hpp>
 #include <esokit/target/recording.hpp>
+#include <esokit/target/st_expressions.hpp>
+#include <esokit/target/st_file.hpp>
 #include <esokit/target/st_translator.hpp>
 #include <esokit/target/structured_text.hpp>
 #include <esokit/target/writable.hpp>

@@ -480,7 +480,7 @@ void monitors_in_text(double plant_gain, double bad, LoopFault fault, std::uint6
     of_health.number(seen.response).number(seen.saturated).word("\n");
     found += diagnose(seen) == fault;
   }
-  EXPECT_GT(found, samples_each / 10);
+  EXPECT_GT(found, 150);
   interprets(loop, of_loop);
   interprets(health, of_health);
 }

@@ -264,7 +264,8 @@ template <class Other>
 void to_c(const Other&, const CodeOptions& = {}) {
   static_assert(detail::knows_in_general<Other>,
                 "esokit: to_c records the function of a KnownModel: it has to be generic, template "
-                "<class E> auto operator()(const E& x) const noexcept");
+                "<class E> auto operator()(const E& x) const noexcept, in numbers of the "
+                "observer's scalar");
   static_assert(
       !detail::knows_in_general<Other> || detail::Writable<Other>,
       "esokit: to_c writes LinearEso, HalfGainEso, ReducedOrderEso, CascadeEso, "
