@@ -44,7 +44,7 @@ static_assert(!Writable<ExtendedStateFilter<2, double, 1, NominalSpring>> &&
               !Writable<ExtendedStateFilter<2, double, 1, NoNominalModel, 10>> &&
               !Writable<ModelEso<follows>> && !Writable<Guarded<LinearEso<2, double, 2>>> &&
               !Writable<Guarded<ModelEso<lag>>> && !Writable<VariableTime<LinearEso<2>>> &&
-              !Writable<PredictiveAdrc<AlgebraicEso<2>>> &&
+              !Writable<PredictiveAdrc<ExtendedStateFilter<2, double, 1, NominalSpring>>> &&
               !Writable<MimoAdrc<LinearEso<1>, LinearEso<1>>>);
 
 #ifdef ESOKIT_LOADS_C

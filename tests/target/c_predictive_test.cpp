@@ -1,9 +1,13 @@
 // The C of a controller in two phases equals it bit for bit: u, estimates and status, with bad and
 // missing samples, gaps, reported u before and after `prepare`, starts and resets.
 #include <esokit/control/predictive_adrc.hpp>
+#include <esokit/observer/adjustable_bandwidth_eso.hpp>
+#include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>
+#include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/half_gain_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
+#include <esokit/observer/nonlinear_eso.hpp>
 #include <target/written.hpp>
 
 namespace esokit_test {
@@ -11,13 +15,17 @@ namespace target_c_predictive_test {
 
 using namespace esokit;
 
+// Refused: a gain that is known with the measurement, a nominal model.
 static_assert(detail::Writable<PredictiveAdrc<LinearEso<2>>> &&
-              !detail::Writable<PredictiveAdrc<CascadeEso<2, 2>>>);
+              !detail::Writable<PredictiveAdrc<AdjustableBandwidthEso<2>>> &&
+              !detail::Writable<PredictiveAdrc<NonlinearEso<2>>>);
 
 #ifdef ESOKIT_LOADS_C
 
-template <class C>
-void predicts(std::uint64_t seed, int samples = 30000) {
+/// @param change of the settings
+template <class C, class Change = void (*)(typename C::Config&)>
+void predicts(
+    std::uint64_t seed, const Change& change = [](auto&) {}, int samples = 30000) {
   SCOPED_TRACE(testing::internal::GetTypeName<C>());
   using V = typename C::scalar_type;
   using Observer = std::remove_cvref_t<decltype(std::declval<C>().observer())>;
@@ -30,6 +38,7 @@ void predicts(std::uint64_t seed, int samples = 30000) {
     config.controller_bandwidth = V(4);
     config.limits = {V(-3), V(2.5), V(60)};
     config.start_hold = V(0.1);
+    change(config);
     C mine = C::make(config).value();
     const Library library(folder, to_c(mine, {.name = "loop"}).value(),
                           "unsigned loop_size(void);\n"
@@ -64,6 +73,7 @@ void predicts(std::uint64_t seed, int samples = 30000) {
     V r(1);
     int lost = 0;
     int limited = 0;
+    int outliers = 0;
     int of_status[64] = {};
     for (int k = 0; k < samples && !testing::Test::HasFailure(); ++k) {
       plant.set_disturbance(2 * std::sin(0.01 * k));
@@ -89,6 +99,7 @@ void predicts(std::uint64_t seed, int samples = 30000) {
       const auto status = static_cast<unsigned>(mine.prepare(next));
       EXPECT_EQ(status, prepare(its, next)) << k;
       ++of_status[status % 64];
+      outliers += status >= 64;
       report();
       if (random.index(2000) == 0) {
         EXPECT_EQ(static_cast<unsigned>(mine.start(y, held)), start(its, y, held)) << k;
@@ -101,6 +112,9 @@ void predicts(std::uint64_t seed, int samples = 30000) {
             equal_bits(V(mine.observer().template estimate<row>()), estimate(its, unsigned{row})))
             << "sample " << k << ", estimate " << row;
       });
+    }
+    if constexpr (requires { config.observer.outlier_threshold; }) {
+      EXPECT_EQ(outliers > samples / 2000, config.observer.outlier_threshold > V(0));
     }
     EXPECT_GT(limited, samples / 50);
     for (const StepStatus status :
@@ -118,12 +132,85 @@ TEST(CPredictive, EqualsTheController) {
   predicts<PredictiveAdrc<ModelEso<lag, double>>>(831);
 }
 
-TEST(CPredictive, CompilesWithOtherCompilers) {
-  using C = PredictiveAdrc<LinearEso<2, float>>;
-  C::Config config{.observer = observer_config<LinearEso<2, float>>(8)};
+/// EPADRC.
+TEST(CPredictive, OfAFilter) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  predicts<PredictiveAdrc<ExtendedStateFilter<2, double>>>(841);
+  predicts<PredictiveAdrc<ExtendedStateFilter<1, float>>>(851);
+  const auto changed = [](RiccatiMode mode, InflationRule rule, double threshold) {
+    return [=](auto& settings) {
+      auto& filter = settings.observer;
+      using V = decltype(filter.inflation);
+      filter.mode = mode;
+      filter.inflation_rule = rule;
+      if (rule != InflationRule::fixed) filter.inflation = V(0);
+      filter.outlier_threshold = V(threshold);
+      filter.max_gap = 7;
+    };
+  };
+  using Filter = PredictiveAdrc<ExtendedStateFilter<1, float>>;
+  predicts<Filter>(861, changed(RiccatiMode::frozen, InflationRule::fixed, 0));
+  predicts<Filter>(871, changed(RiccatiMode::recursive, InflationRule::adaptive, 9));
+  predicts<PredictiveAdrc<ExtendedStateFilter<2, double>>>(
+      881, changed(RiccatiMode::frozen, InflationRule::none, 25));
+}
+
+TEST(CPredictive, OfASchedule) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  predicts<PredictiveAdrc<AlgebraicEso<2, double>>>(891);
+  predicts<PredictiveAdrc<AlgebraicEso<1, float>>>(901);
+  const auto slow = [](auto& settings) {  // it never settles, and publishes late
+    auto& observer = settings.observer;
+    observer.frequency_shift = {};
+    observer.blanking = decltype(observer.frequency_shift)(0.25);
+    observer.start_index = 2;
+  };
+  predicts<PredictiveAdrc<AlgebraicEso<2, float>>>(911, slow);
+  predicts<PredictiveAdrc<AlgebraicEso<1, double>>>(921, slow);
+}
+
+TEST(CPredictive, OfACascade) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  predicts<PredictiveAdrc<CascadeEso<2, 2, double>>>(931);
+  predicts<PredictiveAdrc<CascadeEso<1, 3, float>>>(941);
+  predicts<PredictiveAdrc<ModelCascadeEso<lag, 2, double>>>(951);
+}
+
+inline constexpr ModelParts shown{.order = 1, .sensor = 1};
+template <class V, class Model = AugmentedModel<shown, V>>
+using FilterOfASensor =
+    ExtendedStateFilter<Model::order, V, Model::extension, NoNominalModel, 0, Model>;
+
+/// A sensor in the model: y is not its first state.
+TEST(CPredictive, OfASensor) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  predicts<PredictiveAdrc<ModelEso<everything, double>>>(961);
+  predicts<PredictiveAdrc<ModelCascadeEso<everything, 2, float>>>(971);
+  predicts<PredictiveAdrc<FilterOfASensor<double>>>(981, [](auto& settings) {
+    settings.observer.plant_model.sensor.time_constant = 0.03;
+    settings.observer.disturbance_bounds = {0, 0.5, 0};
+    settings.observer.outlier_threshold = 25;
+  });
+}
+
+template <class C>
+C made() {
+  typename C::Config config{
+      .observer = observer_config<std::remove_cvref_t<decltype(std::declval<C>().observer())>>(8)};
   config.controller_bandwidth = 4;
-  const C controller = C::make(config).value();
-  compiles_elsewhere(to_c(controller, {.name = "loop"}).value(), "loop");
+  if constexpr (requires { config.observer.outlier_threshold; }) {
+    config.observer.outlier_threshold = 9;
+  }
+  return C::make(config).value();
+}
+
+TEST(CPredictive, CompilesWithOtherCompilers) {
+  const auto controller = made<PredictiveAdrc<LinearEso<2, float>>>();
+  const CodeOptions loop{.name = "loop"};
+  compiles_elsewhere(to_c(controller, loop).value(), "loop");
+  compiles_elsewhere(to_c(made<PredictiveAdrc<ExtendedStateFilter<2>>>(), loop).value(), "loop");
+  compiles_elsewhere(to_c(made<PredictiveAdrc<AlgebraicEso<2, float>>>(), loop).value(), "loop");
+  compiles_elsewhere(to_c(made<PredictiveAdrc<CascadeEso<1, 2>>>(), loop).value(), "loop");
   const auto refused = to_c(controller, {.settings_in_struct = true});
   ASSERT_FALSE(refused);
   EXPECT_STREQ(refused.error().field, "settings_in_struct");

@@ -8,6 +8,7 @@
 #include <esokit/adapter/measured.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
+#include <esokit/control/predictive_adrc.hpp>
 #include <esokit/core/error_text.hpp>
 #include <esokit/gain/pole_set.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
@@ -744,6 +745,15 @@ TEST(FixedPoint, RefusesWhatIsNotLinear) {
             std::string::npos);
   using Known = KnownModel<LinearEso<2>, Friction<0, double>>;
   EXPECT_NE(refused(Known::make({.observer = wrapped.observer}).value()).find("is in KnownModel"),
+            std::string::npos);
+  using Predictive = PredictiveAdrc<CascadeEso<2, 2>>;
+  Predictive::Config cascade{.controller_bandwidth = 20, .limits = {-10, 10}};
+  cascade.observer = {.observer_bandwidth = 50,
+                      .bandwidth_factor = 2,
+                      .input_gain = 50,
+                      .sample_time = 1e-3,
+                      .max_gap = 2};
+  EXPECT_NE(refused(Predictive::make(cascade).value()).find("is PredictiveAdrc"),
             std::string::npos);
 }
 

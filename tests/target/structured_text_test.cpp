@@ -352,6 +352,9 @@ void predicts_in_text(std::uint64_t seed) {
     settings.controller_bandwidth = V(4);
     settings.limits = {V(-3), V(2.5), V(60)};
     settings.start_hold = V(0.1);
+    if constexpr (requires { settings.observer.outlier_threshold; }) {
+      settings.observer.outlier_threshold = V(9);
+    }
     C controller = C::make(settings).value();
     const auto block = to_structured_text(controller, {.name = "loop"}).value();
     Samples samples("y no_y next_r u_held starts reports : u status start_status" +
@@ -385,6 +388,9 @@ TEST(StructuredText, OfPredictiveAdrc) {
   if (!there("python3")) GTEST_SKIP() << "no python3";
   predicts_in_text<PredictiveAdrc<LinearEso<2, double>>>(501);
   predicts_in_text<PredictiveAdrc<HalfGainEso<2, float>>>(511);
+  predicts_in_text<PredictiveAdrc<ExtendedStateFilter<1, double>>>(521);
+  predicts_in_text<PredictiveAdrc<AlgebraicEso<1, float>>>(531);
+  predicts_in_text<PredictiveAdrc<CascadeEso<1, 2, float>>>(541);
 }
 
 template <int Order, class V>

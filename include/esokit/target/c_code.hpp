@@ -76,7 +76,9 @@ inline CCode c_texts(const RecordedDesign& design, const std::string& mark) {
     lists += c_function(writer, design.options.name, design.names[i], design.calls[i]);
   }
   const bool controls = design.is_controller;
-  Words words = controls ? c_loop_words(design, writer) : c_observer_words(design);
+  Words words = controls            ? c_loop_words(design, writer)
+                : design.predictive ? c_phase_words(design)
+                                    : c_observer_words(design);
   // Layer by layer: each calls the one below.
   std::string layers;
   std::string predict = "base";
@@ -106,6 +108,7 @@ inline CCode c_texts(const RecordedDesign& design, const std::string& mark) {
   }
   if (design.law.watches) {
     add(c_source_watched);
+    if (!design.predictive) add(c_source_watched_update);
     correct = update = "watched";
   }
   if (gated) {
@@ -127,7 +130,7 @@ inline CCode c_texts(const RecordedDesign& design, const std::string& mark) {
     predict = correct = update = "wrapped";
     restart = "restart_wrapped";
   }
-  if (controls && (wraps || runs)) {
+  if ((controls || design.predictive) && (wraps || runs)) {
     layers += wraps ? c_source_wrapped_rest : c_source_running_rest;
     rest = wraps ? "rest_wrapped" : "rest_running";
   }
@@ -233,8 +236,9 @@ inline CCode c_code(const RecordedDesign& design) {
 /// function is generic (not AlgebraicEso), in Measured (not around WrappedOutput or another
 /// Measured, and not in Guarded), LinearEso and CascadeEso in Guarded, too (a changing b0 unless
 /// the law softens), Adrc of both forms and DisturbanceCompensator around them, and PredictiveAdrc
-/// around one of a single level with constant gains and no sensor in its model, without an adapter.
-/// Others do not compile.
+/// around one without an adapter whose gain is known before the measurement (not
+/// AdjustableBandwidthEso or NonlinearEso), so EPADRC around ExtendedStateFilter, too. Others do
+/// not compile.
 ///
 /// The function of a KnownModel is recorded like all else, with its own numbers as constants: it is
 /// `template <class E> auto operator()(const E& x) const noexcept`, or a template of the scalar
@@ -268,8 +272,9 @@ void to_c(const Other&, const CodeOptions& = {}) {
       "AdjustableBandwidthEso, NonlinearEso, ModelEso, PlantEso, AlgebraicEso and "
       "ExtendedStateFilter, these in DelayedInput, OutlierGate, WrappedOutput and Measured, in "
       "KnownModel (not AlgebraicEso), on the chain with one extended state in Guarded, and "
-      "Adrc and DisturbanceCompensator around them, and PredictiveAdrc around one with constant "
-      "gains; no other gains, adapters or controllers yet");
+      "Adrc and DisturbanceCompensator around them, and PredictiveAdrc around one without an "
+      "adapter whose gain does not depend on the innovation; no other gains, adapters or "
+      "controllers yet");
 }
 
 }  // namespace esokit

@@ -60,8 +60,8 @@ static void law_advance($name_state *o)
   }
 }
 
-/* The gain of so many samples at once, for the poles of now. */
-static bool correct_over($name_state *o, $real y, uint32_t samples)
+/* The poles of now over so many samples. */
+static $real poles_over(const $name_state *o, uint32_t samples)
 {
   $real base = $ONE;
   $real all = $ZERO;
@@ -80,7 +80,14 @@ static bool correct_over($name_state *o, $real y, uint32_t samples)
     (void)joined_poles(o, base, base, &base);
     rest >>= 1u;
   }
-  return correct_long(o, y, all, ($real)samples);
+  return all;
+}
+
+/* The gain of so many samples at once. */
+static bool correct_over($name_state *o, $real y, uint32_t samples)
+{
+  const $real poles = poles_over(o, samples);
+  return correct_long(o, y, poles, ($real)samples);
 }
 
 )";
@@ -134,17 +141,24 @@ inline constexpr const char* c_source_running_update =
 
 /// The gate of ExtendedStateFilter.
 inline constexpr const char* c_source_watched =
-    R"(static unsigned correct_watched($name_state *o, $real y)
+    R"(static bool accepted(const $name_state *o, $real y)
 {
   const $real innovation = y - o->$FIRST;
+  return (o->gap > $ROWSu) || !is_finite(innovation) || fits(o, y);
+}
+
+static unsigned correct_watched($name_state *o, $real y)
+{
   unsigned status = $NAME_OUTLIER_REJECTED;
-  if ((o->gap > $ROWSu) || !is_finite(innovation) || fits(o, y)) {
+  if (accepted(o, y)) {
     status = correct_base(o, y);
   }
   return status;
 }
 
-static unsigned update_watched($name_state *o, $real y, $real u)
+)";
+inline constexpr const char* c_source_watched_update =
+    R"(static unsigned update_watched($name_state *o, $real y, $real u)
 {
   const unsigned status = predict_$below(o, u);
   return status | correct_watched(o, y);

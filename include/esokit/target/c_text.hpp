@@ -127,19 +127,15 @@ inline constexpr const char* c_source_predictive =
     R"(/* What of the next u does not need its measurement. */
 static void arm($name_state *o)
 {
-  static const $real gains[$ROWS][$SIZE] = { /* after 1, 2, .. samples */
-$GAP_GAINS  };
   bool good;
   if (o->hold_left > 0u) {
     (void)arm_hold(o);
     return;
   }
-  if (o->gap > $ROWSu) {
+$ARM_BLANKED  if (o->gap > $ROWSu) {
     good = arm_restart(o);
   } else {
-    const $real *k = gains[(o->gap > 1u) ? (o->gap - 1u) : 0u];
-    good = arm_by(o$ARM_GAINS);
-  }
+$ARM_BY  }
   if (!good) {
     (void)arm_blind(o);
   }
@@ -157,8 +153,8 @@ $INIT  o->measurement = $ZERO;
 unsigned $name_start($name_state *o, $real y, $real u)
 {
   const $name_state before = *o;
-  (void)predict_base(o, u); /* keeps it as applied */
-  if (!rest_at(o, y, u)) {
+  (void)predict_$top(o, u); /* keeps it as applied */
+  if (!$rest(o, y, u)) {
     *o = before;
     return $NAME_STATE_REJECTED;
   }
@@ -187,8 +183,7 @@ unsigned $name_reset($name_state *o, $real y)
 static $real control($name_state *o, $real y)
 {
   $real u = $ZERO;
-  (void)control_by(o, y, &u);
-  o->measurement = y;
+$CONTROL  o->measurement = y;
   o->phase = 1u;
   return u;
 }
@@ -205,10 +200,10 @@ static unsigned prepare($name_state *o, $real next_r)
 {
   unsigned status = 0u;
   if (o->phase == 1u) {
-    status = correct_base(o, o->measurement);
+    status = correct_$top(o, o->measurement);
   }
   (void)track(o);
-  status |= predict_base(o, o->u_last);
+  status |= predict_$top(o, o->u_last);
   o->phase = 0u;
   if (o->hold_left > 0u) {
     o->hold_left = o->hold_left - 1u;

@@ -319,7 +319,6 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
     for (const double k : gains) row += (row.empty() ? "    {" : ", ") + writer.number(k);
     table += row + "},\n";
   }
-  const std::string gains_of_table = table;
   const std::string rows_of_table = std::to_string(design.max_gap + 1);
   std::string table_of_file;
   if (!runs) {
@@ -329,7 +328,8 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
                   : "  static const " + real + " gains[" + rows_of_table + "][" +
                         std::to_string(count) + "] = { /* after 1, 2, .. samples */\n" + table +
                         "  };\n";
-    if (guard.on && !opens) table_of_file.swap(table);  // two functions read it
+    const bool shared = (guard.on && !opens) || design.predictive;  // by two functions
+    if (shared) table_of_file.swap(table);
   }
   const std::string by_table = "correct_by(o, y" + call_gains + ")";
   const std::string corrects =
@@ -431,8 +431,6 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
       {"$SIZE", std::to_string(runs ? 0 : design.gap_gains[0].size())},
       {"$ADOPT", opens ? c_header_adopt : ""},
       {"$TRACK", design.is_controller ? "    (void)applied(o, o->u_last);\n" : ""},
-      {"$GAP_GAINS", gains_of_table},
-      {"$ARM_GAINS", call_gains},
       {"$HOLDu", std::to_string(design.hold) + "u"},
       {"$TABLE", runs ? "" : table},
       {"$OF_TABLE", runs    ? ""
@@ -593,16 +591,45 @@ inline Words c_loop_words(const RecordedDesign& design, const ListWriter& writer
       {"$RESULT", "const $real result = $name_update(&o, samples[i][0], samples[i][1]);"}};
 }
 
+/// What the texts need of a controller in two phases.
+inline Words c_phase_words(const RecordedDesign& design) {
+  const LawNumbers& law = design.law;
+  std::string arms = "    good = arm_by(o";
+  if (law.kind == RunningLaw::none) {
+    arms = "    const $real *k = gains[(o->gap > 1u) ? (o->gap - 1u) : 0u];\n" + arms;
+    for (std::size_t i = 0; i < design.gap_gains[0].size(); ++i) {
+      arms += ", k[" + std::to_string(i) + "]";
+    }
+  }
+  arms += ");\n";
+  const bool scheduled = law.kind == RunningLaw::schedule;
+  if (scheduled) {
+    arms =
+        "    if (o->gap > 1u) {\n      const $real poles = poles_over(o, o->gap);\n      good = "
+        "arm_long(o, poles, ($real)o->gap);\n    } else {\n  " +
+        arms + "    }\n";
+  }
+  return {
+      {"$ARM_BY", arms},
+      {"$ARM_BLANKED", scheduled ? "  if (o->age <= $LEASTu) { /* too early for estimates */\n "
+                                   "   (void)arm_blanked(o);\n    return;\n  }\n"
+                                 : ""},
+      {"$CONTROL", law.watches ? "  if (accepted(o, y)) {\n    (void)control_by(o, y, &u);\n  } "
+                                 "else {\n    (void)control_blind(o, &u);\n  }\n"
+                               : "  (void)control_by(o, y, &u);\n"},
+      {"$LIMITS", ""},
+      {"$COLUMNS", "y, next r, u"},
+      {"$RESULT", "const $real result = $name_update(&o, samples[i][0], samples[i][1]);"}};
+}
+
 /// What the texts need of an observer.
 inline Words c_observer_words(const RecordedDesign& design) {
-  return {
-      {"$LIMITS", ""},
-      {"$COLUMNS", design.predictive ? "y, next r, u" : "y, u, the disturbance"},
-      {"$RESULT", design.predictive
-                      ? "const $real result = $name_update(&o, samples[i][0], samples[i][1]);"
-                      : "$real result;\n    (void)$name_update(&o, samples[i][0], samples[i][1]);\n"
-                        "    result = $name_estimate(&o, $ORDERu);"},
-      {"$ORDER", std::to_string(design.order)}};
+  return {{"$LIMITS", ""},
+          {"$COLUMNS", "y, u, the disturbance"},
+          {"$RESULT",
+           "$real result;\n    (void)$name_update(&o, samples[i][0], samples[i][1]);\n    result = "
+           "$name_estimate(&o, $ORDERu);"},
+          {"$ORDER", std::to_string(design.order)}};
 }
 
 }  // namespace esokit::detail

@@ -94,15 +94,24 @@ struct RecordAccess {
   // ---- A controller in two phases.
 
   /// The lists around which its text goes.
-  template <class Number, int Size, class Add>
+  template <class Number, class Observer, class Add>
   static void add_phases(const Add& add) {
     using Numbers = std::vector<Number>;
+    constexpr RunningLaw runs = kind_of<LawOf<Observer>>;
+    constexpr int size = Observer::size;
     const auto armed = [](auto& c) {
       (void)(all(is_finite(c.blind_)) && all(is_finite(c.offset_)) && all(is_finite(c.slope_)));
       return Numbers{};
     };
-    add("control_by", {"y"}, true,
-        [](auto& c, const auto& in) { return Numbers{c.control(in[0])}; });
+    add("control_by", {"y"}, true, [](auto& c, const auto& in) {
+      if constexpr (observer_traits<Observer>.gates_outliers) {  // asked before, by the text
+        const Number u = c.wanted(in[0]);
+        c.output_ = c.limiter_.clamp(select(c.usable(in[0], u), u, c.blind_));
+        return Numbers{c.output_};
+      } else {
+        return Numbers{c.control(in[0])};
+      }
+    });
     add("control_blind", {}, true,
         [](auto& c, const auto&) { return Numbers{c.control_without_measurement()}; });
     add("refer", {"r"}, false, [](auto& c, const auto& in) {
@@ -141,15 +150,64 @@ struct RecordAccess {
       c.settle_for_blind();
       return Numbers{};
     });
-    std::vector<std::string> gains;
-    for (int i = 1; i <= Size; ++i) gains.push_back("k" + std::to_string(i));
-    add("arm_by", gains, false, [armed](auto& c, const auto& in) {
-      ScaledGain<Size, Number> gain{};
-      for (std::size_t i = 0; i < gain.size(); ++i) gain[i] = in[i];
+    const auto arm = [armed](auto& c, const auto& gains) {
       c.look_ahead();
-      c.arm_by(gain);
+      if constexpr (Observer::levels > 1 || !observer_traits<Observer>.measures_first_row) {
+        c.arm_by(preview(c.observer_, gains));
+      } else {
+        c.arm_by(gains[0]);
+      }
       return armed(c);
-    });
+    };
+    using Gains = Array<ScaledGain<size, Number>, Observer::levels>;
+    if constexpr (runs != RunningLaw::none) {
+      add("arm_by", {}, false, [arm](auto& c, const auto&) {
+        return arm(c, Gains{c.observer_.gain_law().gain(Number(0.0))});
+      });
+    } else {
+      std::vector<std::string> names;
+      for (int i = 1; i <= size * Observer::levels; ++i) names.push_back("k" + std::to_string(i));
+      add("arm_by", names, false, [arm](auto& c, const auto& in) {
+        Gains gains{};
+        std::size_t next = 0;
+        for (auto& level : gains) {
+          for (Number& k : level) k = in[next++];
+        }
+        return arm(c, gains);
+      });
+    }
+    if constexpr (runs == RunningLaw::schedule) {
+      add("arm_long", {"contraction", "samples"}, false, [arm](auto& c, const auto& in) {
+        const EqualSampledPoles<size, Number> poles{in[0]};
+        return arm(c, Gains{long_step_gain<size, Number>(poles, in[1])});
+      });
+      add("arm_blanked", {}, false, [](auto& c, const auto&) {
+        using C = std::remove_cvref_t<decltype(c)>;
+        c.observer_.laws_[0].age_ = std::uint32_t{0};  // it publishes what it keeps
+        typename C::Reference::All reference;
+        int row = 0;
+        for (const Number& one : c.reference_) reference(row++) = one;
+        c.settle_for(c.law_.control(c.observer_.estimate(), reference));
+        c.settle_for_blind();
+        return Numbers{};
+      });
+    }
+  }
+  /// `preview` with gains from elsewhere, `gains[level][row]`.
+  template <class O, class Gains>
+  static typename O::Preview preview(const O& o, const Gains& gains) noexcept {
+    using S = typename O::scalar_type;
+    const auto gain_of = [&](auto level, const S&) -> const auto& {
+      return gains[std::size_t{level}];
+    };
+    typename O::Correction slope{};
+    for (auto& state : slope.states) state.fill(S(0.0));
+    typename O::Correction offset{o.kept_.states};
+    o.correct_by(offset, S(0.0), gain_of);
+    o.correct_by(slope, S(1.0), gain_of);
+    constexpr int last = O::levels - 1;
+    return {O::by_rows(O::template up_to_level<last>(offset.states)),
+            O::by_rows(O::template up_to_level<last>(slope.states))};
   }
   template <class C>
   static unsigned hold_left(const C& c) noexcept {

@@ -478,16 +478,16 @@ Expected<RecordedDesign, Error<typename C::scalar_type>> recorded_design(
   Maker maker(controller, options);
   RecordedDesign& design = maker.design;
   design.predictive = true;
+  design.law = RecordAccess::law_numbers(controller.observer());
   design.hold = RecordAccess::hold_left(controller);
   design.lower = static_cast<double>(RecordAccess::limiter(controller).lower());
   design.upper = static_cast<double>(RecordAccess::limiter(controller).upper());
   const auto of = [](auto& c) -> auto& { return RecordAccess::observer_of(c); };
   maker.add("rest_at", {"y", "u"}, false, [of](auto& c, const Numbers& in) {
-    auto& o = of(c);
-    (void)o.reset(o.equilibrium(in[0], in[1]));
+    RecordAccess::rest(RecordAccess::at_rest(of(c)), in, false);
     return Numbers{};
   });
-  RecordAccess::add_phases<Number, Observer::size>(
+  RecordAccess::add_phases<Number, Observer>(
       [&](const char* name, std::vector<std::string> arguments, bool has_output, auto call) {
         maker.add(name, std::move(arguments), has_output,
                   [call](auto& c, const Numbers& in) { return call(c, in); });

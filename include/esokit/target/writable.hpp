@@ -208,7 +208,7 @@ struct WithScalarOf<PredictiveAdrc<Observer>, T> {
   using type = PredictiveAdrc<WithScalar<Observer, T>>;
 };
 
-/// A controller in two phases around one that has a table of gains and one level.
+/// A controller in two phases around one whose gain is known before the measurement.
 template <class C>
 struct PredictiveOf {};
 template <class Observer>
@@ -216,15 +216,9 @@ struct PredictiveOf<PredictiveAdrc<Observer>> {
   using type = Observer;
 };
 template <class C>
-concept WritablePredictive = HasLists<typename PredictiveOf<C>::type> && requires {
-  requires PredictiveOf<C>::type::levels == 1;
-  requires observer_traits<typename PredictiveOf<C>::type>
-  .gain_kind == GainKind::preset;
-  requires observer_traits<typename PredictiveOf<C>::type>
-  .measures_first_row;
-  requires !observer_traits<typename PredictiveOf<C>::type>.blanks_estimate;
-  requires !observer_traits<typename PredictiveOf<C>::type>.gates_outliers;
-};
+concept WritablePredictive =
+    HasLists<typename PredictiveOf<C>::type> && observer_traits<typename PredictiveOf<C>::type>
+.gain_kind == GainKind::preset;
 
 template <class Object>
 concept Writable =
