@@ -470,7 +470,6 @@ struct Saturating {
 };
 static_assert(!AnalysedObserver<KnownModel<LinearEso<2>, Saturating>>);
 static_assert(!AnalysedController<int>);
-// A filter form knows neither T nor b0.
 
 /// The state of a slow actuator (0.1 s) is computed from u and not corrected: the error decays by
 /// that, however fast the observer.

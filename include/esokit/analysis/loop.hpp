@@ -532,8 +532,8 @@ LoopResult closed_loop(const LinearPlant<States, S, Inputs, Outputs>& plant,
                        const Controller& controller) {
   static_assert(AnalysedController<Controller>,
                 "esokit: the analysis needs a linear controller: for a nonlinear or switched gain "
-                "use FrozenObserver and ObserverWithLaw, for a filter form linear_controller(form, "
-                "config); for your own type write a function linear_controller beside it");
+                "use FrozenObserver and ObserverWithLaw; for your own type write a function "
+                "linear_controller beside it");
   if constexpr (AnalysedController<Controller>) {
     if (const auto ok = plant.check(); !ok) {
       const auto& error = ok.error();
