@@ -24,12 +24,7 @@ TEST(CRunning, OfASchedule) {
   equals<AlgebraicEso<1, float>>(30000, 411);
   observes<AlgebraicEso<2, float>>(30000, 421);
   equals<DelayedInput<OutlierGate<AlgebraicEso<1, double>>, 3>>(30000, 431);
-  const auto slow = [](auto& settings) {  // it never settles, and publishes late
-    auto& observer = innermost(settings);
-    observer.frequency_shift = {};
-    observer.blanking = decltype(observer.frequency_shift)(0.25);
-    observer.start_index = 2;
-  };
+  const auto slow = [](auto& settings) { slow_down(innermost(settings)); };
   equals_changed<Adrc<AlgebraicEso<2, double>>>(30000, 441, "gcc -std=c99", slow);
   equals_changed<Adrc<AlgebraicEso<1, float>, ErrorBased>>(30000, 451, "gcc -std=c99", slow);
 }
@@ -42,10 +37,7 @@ TEST(CRunning, OfAFilter) {
     return [=](auto& settings) {
       auto& filter = innermost(settings);
       using V = decltype(filter.inflation);
-      filter.mode = mode;
-      filter.inflation_rule = rule;
-      if (rule != InflationRule::fixed) filter.inflation = V(0);
-      filter.outlier_threshold = V(threshold);
+      set_filter(filter, mode, rule, threshold);
       filter.max_gap = 12;
       settings.limits = {V(-1.5), V(1.25), V(60)};  // so that it meets them as often as the others
     };

@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <esokit/adapter/guarded.hpp>
+#include <esokit/gain/riccati_settings.hpp>
 #include <esokit/observer/model_eso.hpp>
 #include <esokit/target/c_code.hpp>
 #include <filesystem>
@@ -106,6 +107,23 @@ auto observer_config(double input_gain) {
     if constexpr (requires { config.model.first_order; }) config.model.first_order.fill(V(0.5));
   }
   return config;
+}
+
+/// Another mode of an ExtendedStateFilter.
+template <class Config>
+void set_filter(Config& filter, RiccatiMode mode, InflationRule rule, double threshold) {
+  using V = decltype(filter.inflation);
+  filter.mode = mode;
+  filter.inflation_rule = rule;
+  if (rule != InflationRule::fixed) filter.inflation = V(0);
+  filter.outlier_threshold = V(threshold);
+}
+/// An AlgebraicEso that never settles, and publishes late.
+template <class Config>
+void slow_down(Config& schedule) {
+  schedule.frequency_shift = {};
+  schedule.blanking = decltype(schedule.frequency_shift)(0.25);
+  schedule.start_index = 2;
 }
 
 template <class C>
