@@ -196,6 +196,51 @@ C made() {
   return C::make(config).value();
 }
 
+template <class C>
+void refuses_in_two_phases() {
+  SCOPED_TRACE(testing::internal::GetTypeName<C>());
+  using V = typename C::scalar_type;
+  const Folder folder;
+  const Library library(folder, to_c(made<C>(), {.name = "loop"}).value(), "loop_state loop_one;\n",
+                        "gcc -std=gnu99 -ffast-math -Wno-error");
+  ASSERT_TRUE(library.loaded());
+  const void* its = nullptr;
+  void (*init)(const void*) = nullptr;
+  V (*control)(const void*, V) = nullptr;
+  unsigned (*start)(const void*, V, V) = nullptr;
+  unsigned (*prepare)(const void*, V) = nullptr;
+  unsigned (*applied)(const void*, V) = nullptr;
+  library.find(its, "loop_one");
+  library.find(init, "loop_init");
+  library.find(control, "loop_control");
+  library.find(start, "loop_start");
+  library.find(prepare, "loop_prepare");
+  library.find(applied, "loop_applied");
+  init(its);
+  const auto sample = [&](V y, V next) {
+    EXPECT_TRUE(is_finite(control(its, y)));
+    return prepare(its, next);
+  };
+  for (const V bad : {hidden_nan<V>(), hidden_infinity<V>(), -hidden_infinity<V>()}) {
+    for (int k = 0; k < 20; ++k) (void)sample(V(0.1), V(0.2));
+    EXPECT_EQ(sample(bad, V(0.2)) % 2, 1u) << "measurement_rejected";
+    (void)sample(V(0.1), bad);
+    (void)sample(V(0.1), V(0.2));
+    EXPECT_EQ(applied(its, bad), 2u) << "input_rejected";
+    (void)sample(V(0.1), V(0.2));
+    EXPECT_NE(start(its, bad, V(0)), 0u);
+    EXPECT_NE(start(its, V(0), bad), 0u);
+  }
+}
+
+TEST(CPredictive, RefusesUnderFastMath) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  refuses_in_two_phases<PredictiveAdrc<LinearEso<2, float>>>();
+  refuses_in_two_phases<PredictiveAdrc<ExtendedStateFilter<2>>>();
+  refuses_in_two_phases<PredictiveAdrc<AlgebraicEso<2, float>>>();
+  refuses_in_two_phases<PredictiveAdrc<CascadeEso<1, 2>>>();
+}
+
 TEST(CPredictive, CompilesWithOtherCompilers) {
   const auto controller = made<PredictiveAdrc<LinearEso<2, float>>>();
   const CodeOptions loop{.name = "loop"};
