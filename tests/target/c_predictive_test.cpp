@@ -153,6 +153,8 @@ TEST(CPredictive, EqualsTheController) {
   predicts<PredictiveAdrc<ModelEso<lag, double>>>(831);
 }
 
+#ifndef ESOKIT_ONE_TYPE
+
 /// EPADRC.
 TEST(CPredictive, OfAFilter) {
   if (!there("gcc")) GTEST_SKIP() << "no gcc";
@@ -203,6 +205,8 @@ TEST(CPredictive, OfASensor) {
     settings.observer.outlier_threshold = 25;
   });
 }
+
+#endif  // ESOKIT_ONE_TYPE
 
 template <class C>
 C made() {
