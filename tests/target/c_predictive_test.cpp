@@ -22,6 +22,50 @@ static_assert(detail::Writable<PredictiveAdrc<LinearEso<2>>> &&
 
 #ifdef ESOKIT_LOADS_C
 
+/// The compiled C of a controller in two phases.
+template <class V>
+class InTwoPhases {
+ public:
+  InTwoPhases(const Folder& folder, const CCode& code, const std::string& compiler = "gcc -std=c99")
+      : library_(folder, code, "loop_state loop_one;\n", compiler) {
+    if (!loaded()) return;
+    const auto find = [this](auto& function, const char* name) { library_.find(function, name); };
+    find(its_, "loop_one");
+    find(control_, "loop_control");
+    find(without_, "loop_control_without_measurement");
+    find(estimate_, "loop_estimate");
+    find(start_, "loop_start");
+    find(reset_, "loop_reset");
+    find(prepare_, "loop_prepare");
+    find(applied_, "loop_applied");
+    find(self_test_, "loop_self_test");
+    void (*init)(const void*) = nullptr;
+    find(init, "loop_init");
+    init(its_);
+  }
+  [[nodiscard]] bool loaded() const { return library_.loaded(); }
+  V control(V y) { return control_(its_, y); }
+  V without() { return without_(its_); }
+  V estimate(unsigned row) { return estimate_(its_, row); }
+  unsigned start(V y, V u) { return start_(its_, y, u); }
+  unsigned reset(V y) { return reset_(its_, y); }
+  unsigned prepare(V r) { return prepare_(its_, r); }
+  unsigned applied(V u) { return applied_(its_, u); }
+  int self_test() { return self_test_(V(0)); }
+
+ private:
+  Library library_;
+  const void* its_ = nullptr;
+  V (*control_)(const void*, V) = nullptr;
+  V (*without_)(const void*) = nullptr;
+  V (*estimate_)(const void*, unsigned) = nullptr;
+  unsigned (*start_)(const void*, V, V) = nullptr;
+  unsigned (*reset_)(const void*, V) = nullptr;
+  unsigned (*prepare_)(const void*, V) = nullptr;
+  unsigned (*applied_)(const void*, V) = nullptr;
+  int (*self_test_)(V) = nullptr;
+};
+
 /// @param change of the settings
 template <class C, class Change = void (*)(typename C::Config&)>
 void predicts(
@@ -40,34 +84,9 @@ void predicts(
     config.start_hold = V(0.1);
     change(config);
     C mine = C::make(config).value();
-    const Library library(folder, to_c(mine, {.name = "loop"}).value(),
-                          "unsigned loop_size(void);\n"
-                          "unsigned loop_size(void) { return sizeof(loop_state); }\n");
-    ASSERT_TRUE(library.loaded());
-    void (*init)(void*) = nullptr;
-    V (*control)(void*, V) = nullptr;
-    V (*without)(void*) = nullptr;
-    V (*estimate)(const void*, unsigned) = nullptr;
-    unsigned (*start)(void*, V, V) = nullptr;
-    unsigned (*reset)(void*, V) = nullptr;
-    unsigned (*prepare)(void*, V) = nullptr;
-    unsigned (*applied)(void*, V) = nullptr;
-    unsigned (*size)() = nullptr;
-    int (*self_test)(V) = nullptr;
-    library.find(init, "loop_init");
-    library.find(control, "loop_control");
-    library.find(without, "loop_control_without_measurement");
-    library.find(estimate, "loop_estimate");
-    library.find(start, "loop_start");
-    library.find(reset, "loop_reset");
-    library.find(prepare, "loop_prepare");
-    library.find(applied, "loop_applied");
-    library.find(size, "loop_size");
-    library.find(self_test, "loop_self_test");
-    EXPECT_EQ(self_test(V(0)), 0);
-    std::vector<std::uint64_t> state(size() / sizeof(std::uint64_t) + 1);
-    void* its = state.data();
-    init(its);
+    InTwoPhases<V> in_c(folder, to_c(mine, {.name = "loop"}).value());
+    ASSERT_TRUE(in_c.loaded());
+    EXPECT_EQ(in_c.self_test(), 0);
     ChainPlant plant(C::order, 0.0078125, input_gain, 1.5);
     Random random(seed++);
     V r(1);
@@ -88,30 +107,30 @@ void predicts(
           random.index(10) == 0 ? anything<V>(random) : static_cast<V>(random.uniform(-2, 2));
       const auto report = [&] {
         if (random.index(40) != 0) return;
-        EXPECT_EQ(static_cast<unsigned>(mine.applied(held)), applied(its, held)) << k;
+        EXPECT_EQ(static_cast<unsigned>(mine.applied(held)), in_c.applied(held)) << k;
       };
       const V u = lost > 0 ? mine.control_without_measurement() : mine.control(y);
-      const V of_c = lost > 0 ? without(its) : control(its, y);
+      const V of_c = lost > 0 ? in_c.without() : in_c.control(y);
       EXPECT_TRUE(equal_bits(u, of_c)) << "sample " << k << ": " << u << ", C " << of_c;
       limited += u <= V(-3) || u >= V(2.5);
       report();
       const V next = random.index(400) == 0 ? anything<V>(random) : r;
       const auto status = static_cast<unsigned>(mine.prepare(next));
-      EXPECT_EQ(status, prepare(its, next)) << k;
+      EXPECT_EQ(status, in_c.prepare(next)) << k;
       ++of_status[status % 64];
       outliers += status >= 64;
       report();
       if (random.index(2000) == 0) {
-        EXPECT_EQ(static_cast<unsigned>(mine.start(y, held)), start(its, y, held)) << k;
+        EXPECT_EQ(static_cast<unsigned>(mine.start(y, held)), in_c.start(y, held)) << k;
         if (random.index(2) == 0) lost = 2;  // the first sample is missing
       }
       if (random.index(2000) == 0) {
-        EXPECT_EQ(static_cast<unsigned>(mine.reset(y)), reset(its, y)) << k;
+        EXPECT_EQ(static_cast<unsigned>(mine.reset(y)), in_c.reset(y)) << k;
         if (random.index(2) == 0) lost = 2;
       }
       detail::unroll<Observer::size>([&](auto row) {
         EXPECT_TRUE(
-            equal_bits(V(mine.observer().template estimate<row>()), estimate(its, unsigned{row})))
+            equal_bits(V(mine.observer().template estimate<row>()), in_c.estimate(unsigned{row})))
             << "sample " << k << ", estimate " << row;
       });
     }
@@ -133,6 +152,8 @@ TEST(CPredictive, EqualsTheController) {
   predicts<PredictiveAdrc<HalfGainEso<2, float>>>(821);
   predicts<PredictiveAdrc<ModelEso<lag, double>>>(831);
 }
+
+#ifndef ESOKIT_ONE_TYPE
 
 /// EPADRC.
 TEST(CPredictive, OfAFilter) {
@@ -185,6 +206,8 @@ TEST(CPredictive, OfASensor) {
   });
 }
 
+#endif  // ESOKIT_ONE_TYPE
+
 template <class C>
 C made() {
   typename C::Config config{
@@ -201,35 +224,22 @@ void refuses_in_two_phases() {
   SCOPED_TRACE(testing::internal::GetTypeName<C>());
   using V = typename C::scalar_type;
   const Folder folder;
-  const Library library(folder, to_c(made<C>(), {.name = "loop"}).value(), "loop_state loop_one;\n",
-                        "gcc -std=gnu99 -ffast-math -Wno-error");
-  ASSERT_TRUE(library.loaded());
-  const void* its = nullptr;
-  void (*init)(const void*) = nullptr;
-  V (*control)(const void*, V) = nullptr;
-  unsigned (*start)(const void*, V, V) = nullptr;
-  unsigned (*prepare)(const void*, V) = nullptr;
-  unsigned (*applied)(const void*, V) = nullptr;
-  library.find(its, "loop_one");
-  library.find(init, "loop_init");
-  library.find(control, "loop_control");
-  library.find(start, "loop_start");
-  library.find(prepare, "loop_prepare");
-  library.find(applied, "loop_applied");
-  init(its);
+  InTwoPhases<V> in_c(folder, to_c(made<C>(), {.name = "loop"}).value(),
+                      "gcc -std=gnu99 -ffast-math -Wno-error");
+  ASSERT_TRUE(in_c.loaded());
   const auto sample = [&](V y, V next) {
-    EXPECT_TRUE(is_finite(control(its, y)));
-    return prepare(its, next);
+    EXPECT_TRUE(is_finite(in_c.control(y)));
+    return in_c.prepare(next);
   };
   for (const V bad : {hidden_nan<V>(), hidden_infinity<V>(), -hidden_infinity<V>()}) {
     for (int k = 0; k < 20; ++k) (void)sample(V(0.1), V(0.2));
     EXPECT_EQ(sample(bad, V(0.2)) % 2, 1u) << "measurement_rejected";
     (void)sample(V(0.1), bad);
     (void)sample(V(0.1), V(0.2));
-    EXPECT_EQ(applied(its, bad), 2u) << "input_rejected";
+    EXPECT_EQ(in_c.applied(bad), 2u) << "input_rejected";
     (void)sample(V(0.1), V(0.2));
-    EXPECT_NE(start(its, bad, V(0)), 0u);
-    EXPECT_NE(start(its, V(0), bad), 0u);
+    EXPECT_NE(in_c.start(bad, V(0)), 0u);
+    EXPECT_NE(in_c.start(V(0), bad), 0u);
   }
 }
 
