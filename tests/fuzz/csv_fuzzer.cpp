@@ -29,7 +29,7 @@ void read_as_log(std::string_view text, char separator, bool stamps) {
     // Stamps begin at zero, whatever they are.
     for (std::size_t i = 0; stamps && i < log.rows(); ++i) {
       const double first = log.column(0)[i];
-      if (std::isnan(first)) continue;
+      if (!std::isfinite(first)) continue;  // refused below
       require(!(first > 0) && !(first < 0), "the first stamp is not zero");
       break;
     }
