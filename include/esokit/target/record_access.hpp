@@ -100,13 +100,14 @@ struct RecordAccess {
     constexpr RunningLaw runs = kind_of<LawOf<Observer>>;
     constexpr int size = Observer::size;
     const auto armed = [](auto& c) {
-      (void)(all(is_finite(c.blind_)) && all(is_finite(c.offset_)) && all(is_finite(c.slope_)));
+      (void)(all(is_finite(c.next_.blind)) && all(is_finite(c.next_.offset)) &&
+             all(is_finite(c.next_.slope)));
       return Numbers{};
     };
     add("control_by", {"y"}, true, [](auto& c, const auto& in) {
       if constexpr (observer_traits<Observer>.gates_outliers) {  // asked before, by the text
         const Number u = c.wanted(in[0]);
-        c.output_ = c.limiter_.clamp(select(c.usable(in[0], u), u, c.blind_));
+        c.output_ = c.limiter_.clamp(select(c.usable(in[0], u), u, c.next_.blind));
         return Numbers{c.output_};
       } else {
         return Numbers{c.control(in[0])};
@@ -187,7 +188,7 @@ struct RecordAccess {
         typename C::Reference::All reference;
         int row = 0;
         for (const Number& one : c.reference_) reference(row++) = one;
-        c.settle_for(c.law_.control(c.observer_.estimate(), reference));
+        c.settle_for(c.set_.law.control(c.observer_.estimate(), reference));
         c.settle_for_blind();
         return Numbers{};
       });
