@@ -180,8 +180,6 @@ class ObservedLevels {
   friend struct detail::GuardAccess;
   friend struct detail::RecordAccess;
 
-  using Numbers = detail::LevelNumbers<Order, S, Extension, Law, Levels, Model>;
-
   /// At rest at zero.
   ObservedLevels(const Laws& laws, const Model& model, std::uint16_t max_gap) noexcept
       : numbers_{{}, laws, model}, max_gap_(max_gap) {
@@ -196,6 +194,12 @@ class ObservedLevels {
 
   /// True if `step` may be tried.
   [[nodiscard]] ESOKIT_INLINE constexpr bool may_be_quick() const noexcept { return gap_ == 0; }
+
+  /// All data members, for derived classes.
+  static constexpr int data_members = 3;
+
+  /// @cond
+  using Numbers = detail::LevelNumbers<Order, S, Extension, Law, Levels, Model>;
 
   /// Number of samples that the next correction bridges.
   [[nodiscard]] constexpr unsigned elapsed() const noexcept {
@@ -222,11 +226,10 @@ class ObservedLevels {
     return gap;
   }
 
-  /// All data members, for derived classes.
-  static constexpr int data_members = 3;
   Numbers numbers_;
   Lanes<std::uint16_t, S> gap_{};
   Lanes<std::uint16_t, S> max_gap_;
+  /// @endcond
 };
 
 }  // namespace esokit
