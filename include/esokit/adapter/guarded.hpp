@@ -115,7 +115,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   static_assert(on_chain || !varies_time,
                 "esokit: with a model Guarded needs a fixed sample time: not with "
                 "VariableTime");
-  static_assert(!Guards::turns_move_constant(),
+  static_assert(!Guards::turns_move_constant,
                 "esokit: with the poles of a plant a whole turn is a step of the constant: Guarded "
                 "takes WrappedOutput without plant_poles");
 

@@ -60,13 +60,9 @@ struct GuardedStates {
   static constexpr int levels = Observer::levels;
   static constexpr bool on_chain = model_traits<Model>.is_chain;
 
-  static constexpr bool turns_move_constant() noexcept {
-    if constexpr (requires { Model::parts.plant_poles; }) {
-      return Model::parts.plant_poles && observer_traits<Observer>.wraps_output;
-    } else {
-      return false;
-    }
-  }
+  static constexpr bool turns_move_constant = observer_traits<Observer>.wraps_output && requires {
+    requires Model::parts.plant_poles;
+  };
 
   explicit constexpr GuardedStates(const Model& model) noexcept : constant(model) {}
 

@@ -72,10 +72,6 @@ class PredictorCorrector : public ObservedLevels<Order, S, Extension, Law, Level
   using Base = ObservedLevels<Order, S, Extension, Law, Levels, Model>;
 
  public:
-  using Base::input_gain;
-  using Base::missed;
-  using Base::sample_time;
-  using Base::size;
   using typename Base::Estimate;
   using typename Base::Laws;
   using typename Base::State;
@@ -223,19 +219,19 @@ class PredictorCorrector : public ObservedLevels<Order, S, Extension, Law, Level
   Check<S> adopt(const PredictorCorrector& fresh) {
     PredictorCorrector next = fresh;
     if constexpr (gain_law_traits<Law>.continues) {
-      const S time_ratio = fresh.sample_time() / sample_time();
+      const S time_ratio = fresh.sample_time() / this->sample_time();
       for (std::size_t i = 0; i < Levels; ++i) {
         if (auto ok = next.numbers_.laws[i].continue_from(numbers_.laws[i], time_ratio); !ok)
           return ok;
       }
     }
     next.numbers_.kept = numbers_.kept;
-    next.gap_ = missed() == 0 ? next.up_to_date() : gap_;
+    next.gap_ = this->missed() == 0 ? next.up_to_date() : gap_;
     LevelStates states = numbers_.kept.states;
     const Model& model = fresh.model();
     for (State& state : states) state = model.rescaled(state, numbers_.model);
     if (!model.same_drive(numbers_.model)) {
-      const S explained = (input_gain() - fresh.input_gain()) * numbers_.kept.applied_input;
+      const S explained = (this->input_gain() - fresh.input_gain()) * numbers_.kept.applied_input;
       Numbers::add_disturbance(states, model.scaled_disturbance(explained));
     }
     if (!next.numbers_.take(states)) {
@@ -285,7 +281,10 @@ class PredictorCorrector : public ObservedLevels<Order, S, Extension, Law, Level
     return true;
   }
   ESOKIT_INLINE bool predict_all(const S& u_applied) noexcept {
-    return take_prediction(numbers_.predicted(u_applied), u_applied);
+    if (!numbers_.take(numbers_.predicted(u_applied))) [[unlikely]]
+      return false;
+    count_prediction(u_applied);
+    return true;
   }
   ESOKIT_INLINE bool correct_all(const S& y) noexcept {
     if (!(gap_ == 1 || gap_ == 0)) [[unlikely]]
@@ -338,20 +337,17 @@ class PredictorCorrector : public ObservedLevels<Order, S, Extension, Law, Level
     return is_finite(y) && due && reset(y) == StepStatus::ok ? StepStatus::restarted
                                                              : StepStatus::measurement_rejected;
   }
-  /// False, and nothing has changed, if the prediction is not finite.
-  ESOKIT_INLINE bool take_prediction(const LevelStates& next, const S& u) noexcept {
-    if (!numbers_.take(next)) [[unlikely]]
-      return false;
+  constexpr void count_prediction(const S& u) noexcept {
     count_missed();
     numbers_.kept.applied_input = u;
-    return true;
   }
   ESOKIT_COLD LevelStates predicted_seldom(S u) const noexcept { return numbers_.predicted(u); }
+  ESOKIT_COLD bool take_seldom(const LevelStates& next) noexcept { return numbers_.take(next); }
 
   ESOKIT_COLD Status update_guarded(S y, S u_applied) noexcept {
     const LevelStates before = numbers_.kept.states;
     const LevelStates next = predicted_seldom(u_applied);
-    if (Numbers::has_squares && missed() == 0) {  // perhaps only the squares overflowed
+    if (Numbers::has_squares && this->missed() == 0) {  // perhaps only the squares overflowed
       numbers_.kept.states = next;
       if (corrected(y, 1u)) {
         numbers_.kept.applied_input = u_applied;
@@ -359,8 +355,12 @@ class PredictorCorrector : public ObservedLevels<Order, S, Extension, Law, Level
       }
       numbers_.kept.states = before;
     }
-    const StepStatus predicted =
-        take_prediction(next, u_applied) ? StepStatus::ok : predict_rejecting(u_applied);
+    StepStatus predicted = StepStatus::ok;
+    if (take_seldom(next)) {
+      count_prediction(u_applied);
+    } else {
+      predicted = predict_rejecting(u_applied);
+    }
     return predicted | correct(y);
   }
 
@@ -392,7 +392,7 @@ class PredictorCorrector : public ObservedLevels<Order, S, Extension, Law, Level
       gap_ = restart_due;
       return StepStatus::prediction_dropped;
     }
-    if (numbers_.take(predicted_seldom(numbers_.kept.applied_input))) {
+    if (take_seldom(predicted_seldom(numbers_.kept.applied_input))) {
       return StepStatus::input_rejected;
     }
     // The state itself cannot be predicted, and perhaps never can again: the next y restarts the
@@ -405,9 +405,9 @@ class PredictorCorrector : public ObservedLevels<Order, S, Extension, Law, Level
     LevelStates states;
     for (auto& level : states) level = state;
     for (std::size_t i = 1; i < Levels && Numbers::adds_up; ++i) {
-      for (std::size_t r = Order; r < size; ++r) states[i][r] = S(0.0);
+      for (std::size_t r = Order; r < state.size(); ++r) states[i][r] = S(0.0);
     }
-    if (!numbers_.take(states)) return StepStatus::state_rejected;
+    if (!take_seldom(states)) return StepStatus::state_rejected;
     numbers_.kept.innovation = S(0.0);
     gap_ = up_to_date();
     detail::unroll<(gain_law_traits<Law>.resets ? Levels : 0)>(
