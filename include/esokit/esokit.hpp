@@ -137,7 +137,6 @@
 #include <esokit/model/model_parts.hpp>
 #include <esokit/model/parts_shape.hpp>
 #include <esokit/model/plant_model.hpp>
-#include <esokit/model/plant_shape.hpp>
 #include <esokit/model/sampled_model.hpp>
 #include <esokit/model/scaled_chain.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>

@@ -145,12 +145,10 @@ struct ConstantLevel {
   /// The steady error of the states under a constant d. @param d scaled @param leak a
   [[nodiscard]] Matrix<S, Size, 1> leak_error(const S& leak, const S& d) const {
     // (I - A) error = leak d.
-    auto kept = -error(S(1.0), leak);
     Matrix<S, Size, 1> left;
     const S leaking = leak * d;
     for (int i = 0; i < Size; ++i) left(i) = leaking * column[static_cast<std::size_t>(i)];
-    solve_in_place(DenseView<S>{kept.data(), Size}, DenseView<S>{left.data(), Size, 1});
-    return left;
+    return solved(-error(S(1.0), leak), left);
   }
 };
 
@@ -186,19 +184,12 @@ Array<S, Order + 1> leak_error(const std::array<ScaledGain<Order + 1, S>, Levels
 template <int Size, Scalar S>
 ErrorPolynomial<Size, S> bilinear_polynomial(const Matrix<S, Size, Size>& difference,
                                              const S& unit) {
-  auto mapped = difference;
-  auto half = Matrix<S, Size, Size>::Identity() + difference * S(0.5);
-  solve_in_place(DenseView<S>{half.data(), Size}, DenseView<S>{mapped.data(), Size, Size});
-  mapped = mapped / unit;
+  const auto half = Matrix<S, Size, Size>::Identity() + difference * S(0.5);
+  const auto lower = characteristic(Matrix<S, Size, Size>(solved(half, difference) / unit),
+                                    [](int, const auto&) {});
   ErrorPolynomial<Size, S> q{};
+  for (std::size_t i = 0; i < Size; ++i) q[i] = lower[i];
   q[Size] = S(1.0);
-  auto adjugate = Matrix<S, Size, Size>::Identity();
-  for (int k = 1; k <= Size; ++k) {
-    adjugate = mapped * adjugate;
-    const S next = -adjugate.trace() / S(static_cast<double>(k));
-    q[static_cast<std::size_t>(Size - k)] = next;
-    for (int i = 0; i < Size; ++i) adjugate(i, i) = adjugate(i, i) + next;
-  }
   return q;
 }
 

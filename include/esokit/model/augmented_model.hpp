@@ -47,11 +47,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   static constexpr int la = Parts.actuator;
   static constexpr int lf = Parts.sensor;
   static constexpr int m = Parts.constants;
-  static_assert(n >= 1, "esokit: the plant order must be at least 1");
-  static_assert(m >= 1, "esokit: at least one extended state is needed");
-  static_assert(la >= 0 && la <= 2 && lf >= 0 && lf <= 2, "esokit: a lag has order 0, 1 or 2");
-  static_assert(Parts.resonators >= 0 && Parts.first_order >= 0,
-                "esokit: the number of parts must not be negative");
+  static_assert(Parts.states == 0, "esokit: a whole plant needs model/plant_model.hpp");
 
  public:
   static constexpr ModelParts parts = Parts;  ///< what is known
@@ -388,11 +384,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
     if constexpr (part_lf > 0) less.sensor = rest_.settings.sensor;
     less.resonators = present().resonators;
     less.first_order = rest_.settings.first_order;
-    const auto with_input = Part::rates(less, sample_time_);
-    Matrix<S, part_size, part_size> rates;
-    for (int i = 0; i < part_size; ++i) {
-      for (int j = 0; j < part_size; ++j) rates(i, j) = with_input(i, j);
-    }
+    const auto rates = detail::block<part_size, part_size>(Part::rates(less, sample_time_), 0, 0);
 
     CorrectedPart<part_size, size, Parts.resonators, S> part;
     part.step = detail::exp_minus_identity(rates);
@@ -409,7 +401,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
     derivative(part_d) = S(1);
     for (int r = 0; r < n; ++r) part.whole(lf + r, part_lf + r) = S(1);
     for (int r = n; r <= order; ++r) {
-      for (int j = 0; j < part_size; ++j) part.whole(lf + r, j) = derivative(j);
+      detail::set_block(part.whole, lf + r, 0, derivative);
       derivative = derivative * rates / number(r + 1);
     }
     for (int i = 1; i < extension - lf; ++i) part.whole(lf + order + i, part_d + i) = S(1);
@@ -418,11 +410,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
       for (int i = 0; i < lf; ++i) part.whole(i, i) = S(1);
     } else {
       // The sensor's error follows from the errors of the other states.
-      const auto shown = detail::shown_by_sensor(rest_.settings.sensor, sample_time_, rates);
-      for (int j = 0; j < part_size; ++j) {
-        part.output[static_cast<std::size_t>(j)] = shown(0, j);
-        for (int i = 0; i < lf; ++i) part.whole(i, j) = shown(i, j);
-      }
+      part.set_shown(detail::shown_by_sensor(rest_.settings.sensor, sample_time_, rates));
     }
     part.pairs = detail::own_pairs(less.resonators);
     return part;
@@ -462,8 +450,8 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
 
 /// Distinguishes the type in snapshots.
 template <ModelParts Parts, Scalar S>
-inline constexpr std::uint32_t type_tag<AugmentedModel<Parts, S>> =
-    make_type_tag<S>("AugmentedModel", Parts.order, Parts.plant_poles, Parts.actuator, Parts.sensor,
-                     Parts.constants, Parts.resonators, Parts.first_order, Parts.follows_speed);
+inline constexpr std::uint32_t type_tag<AugmentedModel<Parts, S>> = make_type_tag<S>(
+    "AugmentedModel", Parts.order, Parts.plant_poles, Parts.actuator, Parts.sensor, Parts.constants,
+    Parts.resonators, Parts.first_order, Parts.follows_speed, Parts.states);
 
 }  // namespace esokit

@@ -190,15 +190,7 @@ struct LinearPlant {
   /// a_0 .. a_(n-1) of det(s I - A) = s^n + a_(n-1) s^(n-1) + .. + a_0: the plant's poles, as
   /// `chain` and `.plant` of an AugmentedModel take them.
   [[nodiscard]] constexpr Array<ScalarType, States> coefficients() const noexcept {
-    Array<ScalarType, States> all{};
-    auto power = Matrix<ScalarType, States, States>::Identity();  // Faddeev-LeVerrier algorithm
-    for (int k = 1; k <= States; ++k) {
-      power = a * power;
-      const ScalarType next = -power.trace() / detail::integer<ScalarType>(k);
-      all[static_cast<std::size_t>(States - k)] = next;
-      for (int i = 0; i < States; ++i) power(i, i) = power(i, i) + next;
-    }
-    return all;
+    return detail::characteristic(a, [](int, const auto&) {});
   }
 
  private:
@@ -224,10 +216,10 @@ struct LinearPlant {
   [[nodiscard]] constexpr Reached first_gain(int output) const noexcept {
     using Table = detail::TableScalar<ScalarType>;
     RowVector<ScalarType, States> row = c.row(output);
-    RowVector<ScalarType, States> magnitude = magnitudes(row);
+    RowVector<ScalarType, States> magnitude = detail::magnitudes(row);
     for (int degree = 1; degree <= States; ++degree) {
       const auto gain = row * b;
-      const auto size = magnitude * magnitudes(b);
+      const auto size = magnitude * detail::magnitudes(b);
       const ScalarType rounding(std::numeric_limits<Table>::epsilon() *
                                 static_cast<Table>(2 * States * degree));
       for (int j = 0; j < Inputs; ++j) {
@@ -235,16 +227,9 @@ struct LinearPlant {
         if (lost || !all(detail::absolute(gain(j)) <= rounding * size(j))) return {degree, gain};
       }
       row = row * a;
-      magnitude = magnitude * magnitudes(a);
+      magnitude = magnitude * detail::magnitudes(a);
     }
     return {0, {}};
-  }
-
-  template <int Rows, int Columns>
-  static constexpr Matrix<ScalarType, Rows, Columns> magnitudes(
-      Matrix<ScalarType, Rows, Columns> matrix) noexcept {
-    for (ScalarType& element : matrix) element = detail::absolute(element);
-    return matrix;
   }
 };
 
@@ -263,14 +248,10 @@ constexpr Expected<LinearPlant<States + More, S, Inputs, Outputs>, Error<S>> wit
   if (!rules) return rules.error();
   LinearPlant<States + More, S, Inputs, Outputs> bigger;
   bigger.dead_time = plant.dead_time;
-  for (int i = 0; i < States; ++i) {
-    for (int j = 0; j < States; ++j) bigger.a(i, j) = plant.a(i, j);
-    for (int j = 0; j < Inputs; ++j) {
-      bigger.b(i, j) = plant.b(i, j);
-      bigger.e(i, j) = plant.e(i, j);
-    }
-    for (int j = 0; j < Outputs; ++j) bigger.c(j, i) = plant.c(j, i);
-  }
+  set_block(bigger.a, 0, 0, plant.a);
+  set_block(bigger.b, 0, 0, plant.b);
+  set_block(bigger.e, 0, 0, plant.e);
+  set_block(bigger.c, 0, 0, plant.c);
   const S rate = S(1.0) / time_constant;
   for (int j = States; j < States + More; ++j) bigger.a(j, j) = -rate;
   connect(bigger, rate);
