@@ -97,10 +97,8 @@ void finds_states_and_disturbance(const LinearPlant<States>& plant) {
 
 // Another plant at the same T: the estimates stay as they are, to the last bit.
 TEST(PlantModel, ARetuneKeepsTheEstimates) {
-  ZeroEso::Config config{.observer_bandwidth = 60.0,
-                         .input_gain = 200.0,
-                         .sample_time = kT,
-                         .model = {with_zero()}};
+  ZeroEso::Config config{
+      .observer_bandwidth = 60.0, .input_gain = 200.0, .sample_time = kT, .model = {with_zero()}};
   auto eso = ZeroEso::make(config).value();
   for (int k = 0; k < 100; ++k) (void)eso.update(std::sin(0.05 * k), std::cos(0.03 * k));
   const auto before = eso.estimate();

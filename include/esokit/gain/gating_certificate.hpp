@@ -21,8 +21,10 @@
 #pragma once
 
 #include <cmath>
+#include <esokit/gain/model_placement.hpp>
 #include <esokit/gain/switching_certificate.hpp>
 #include <esokit/math/dense.hpp>
+#include <esokit/model/chain_model.hpp>
 #include <esokit/model/corrected_part.hpp>
 
 namespace esokit {
@@ -46,9 +48,14 @@ ErrorPolynomial<Size, S> leaking_polynomial(const ScaledGain<Size, S>& gain, con
   return p;
 }
 
-/// For q_0 = 0, which makes the product zero at w = 0: tests the rest, divided by w^2.
+/// Re p / q > 0 on the imaginary axis, with p stable. @param leaks false: q_0 = 0, which makes the
+/// product zero at w = 0; the rest, divided by w^2, is tested
 template <int Size, Scalar S>
-bool positive_but_at_standstill(const Array<S, Size + 1>& product) {
+bool certified_against(const ErrorPolynomial<Size, S>& p, const ErrorPolynomial<Size, S>& q,
+                       bool leaks) {
+  if (!is_hurwitz<Size, S>(p) || !(q[1] > S(0.0))) return false;
+  const auto product = half_plane_product<Size, S>(p, q);
+  if (leaks) return positive_on_half_line<Size, S>(product);
   Array<S, Size> rest{};
   for (std::size_t i = 0; i < Size; ++i) rest[i] = product[i + 1];
   return positive_on_half_line<Size - 1, S>(rest);
@@ -67,12 +74,9 @@ template <int Size, Scalar S>
   if (!is_finite(unit) || !(unit > S(0.0))) return false;
   ScaledGain<Size, S> frozen = gain;
   frozen[Size - 1] = S(0.0);
-  const auto p = detail::leaking_polynomial<Size, S>(gain, leak, unit);
-  const auto q = detail::leaking_polynomial<Size, S>(frozen, leak, unit);
-  if (!is_hurwitz<Size, S>(p) || !(q[1] > S(0.0))) return false;
-  const auto product = detail::half_plane_product<Size, S>(p, q);
-  if (leak > S(0.0)) return positive_on_half_line<Size, S>(product);
-  return detail::positive_but_at_standstill<Size, S>(product);
+  return detail::certified_against<Size, S>(detail::leaking_polynomial<Size, S>(gain, leak, unit),
+                                            detail::leaking_polynomial<Size, S>(frozen, leak, unit),
+                                            leak > S(0.0));
 }
 
 namespace detail {
@@ -88,32 +92,25 @@ struct ConstantLevel {
   Array<S, Size> column{};     ///< change of x with the constant
 
   /// That of a chain with one extended state.
-  explicit ConstantLevel(const ScaledGain<Size, S>& of_chain) : gain(of_chain) {
-    constexpr auto& binomials = binomial_table<Size, TableScalar<S>>;
-    for (std::size_t i = 0; i < Size; ++i) {
-      for (std::size_t j = 0; j < Size; ++j) {
-        step(static_cast<int>(i), static_cast<int>(j)) = j > i ? S(binomials[j][i]) : S(0.0);
-      }
-      ahead[i] = S(1.0);
-      row[i] = column[i] = S(i + 1 == Size ? 1.0 : 0.0);
-    }
+  explicit ConstantLevel(const ScaledGain<Size, S>& of_chain)
+      : step(ChainModel<Size - 1, S>::increment()), gain(of_chain) {
+    ahead.fill(S(1.0));
+    row.fill(S(0.0));
+    row[Size - 1] = S(1.0);
+    column = row;
   }
 
   template <int Whole, int Pairs, class Model>
   ConstantLevel(const CorrectedPart<Size, Whole, Pairs, S>& part, const Model& model,
                 const ScaledGain<Whole, S>& of_model)
-      : step(part.step) {
+      : step(part.step), ahead(output_ahead<Size>(part.output, part.step)) {
     const auto constant_row = model.constant_row();
     const auto constant_column = model.constant_column();
     for (std::size_t j = 0; j < Size; ++j) {
       const auto state = static_cast<std::size_t>(part.states[j]);
       gain[j] = of_model[state];
       column[j] = constant_column[state];
-      ahead[j] = part.output[j];
       row[j] = S(0.0);
-      for (std::size_t i = 0; i < Size; ++i) {
-        ahead[j] = ahead[j] + part.output[i] * step(static_cast<int>(i), static_cast<int>(j));
-      }
       for (std::size_t i = 0; i < Whole; ++i) {
         row[j] = row[j] + constant_row[i] * part.whole(static_cast<int>(i), static_cast<int>(j));
       }
@@ -207,12 +204,9 @@ template <int Size, Scalar S>
       detail::absolute(detail::bilinear_polynomial<Size, S>(trusted, S(1.0))[0]);
   const S unit = std::pow(product_of_poles, S(1.0) / S(static_cast<double>(Size)));
   if (!is_finite(unit) || !(unit > S(0.0))) return false;
-  const auto p = detail::bilinear_polynomial<Size, S>(trusted, unit);
-  const auto q = detail::bilinear_polynomial<Size, S>(level.error(S(0.0), leak), unit);
-  if (!is_hurwitz<Size, S>(p) || !(q[1] > S(0.0))) return false;
-  const auto product = detail::half_plane_product<Size, S>(p, q);
-  return leak > S(0.0) ? positive_on_half_line<Size, S>(product)
-                       : detail::positive_but_at_standstill<Size, S>(product);
+  return detail::certified_against<Size, S>(
+      detail::bilinear_polynomial<Size, S>(trusted, unit),
+      detail::bilinear_polynomial<Size, S>(level.error(S(0.0), leak), unit), leak > S(0.0));
 }
 
 /// What is proven of a plant that is held and released, see `holding`.

@@ -80,37 +80,30 @@ struct PartDesign {
   /// (I + A)(I + B) - I.
   static Square joined(const Square& a, const Square& b) { return a * b + (a + b); }
 
-  /// The largest magnitude of an element; infinite if one is not finite.
-  static S largest(const Square& a) {
-    S most(0.0);
-    for (int i = 0; i < Size; ++i) {
-      for (int j = 0; j < Size; ++j) {
-        if (!all(is_finite(a(i, j)))) return detail::unbounded<S>();
-        const S size = absolute(a(i, j));
-        most = select(most < size, size, most);
-      }
-    }
-    return most;
-  }
-
-  /// -ln of the magnitude of the largest pole of I + A, from its powers; -1 if they are not finite.
-  /// @param units a^degree, units in which the elements of A are of similar size
-  static S decay(Square a, const Array<S, Size>& units) {
-    using std::log;
+  /// A in these units.
+  static Square in_units(Square a, const Array<S, Size>& units) {
     for (std::size_t i = 0; i < Size; ++i) {
       for (std::size_t j = 0; j < Size; ++j) {
         S& x = a(static_cast<int>(i), static_cast<int>(j));
         x = x * (units[j] / units[i]);
       }
     }
+    return a;
+  }
+
+  /// -ln of the magnitude of the largest pole of I + A, from its powers; -1 if they are not finite.
+  /// @param units a^degree, units in which the elements of A are of similar size
+  static S decay(Square a, const Array<S, Size>& units) {
+    using std::log;
+    a = in_units(a, units);
     S share(1.0);
-    for (; all(largest(a) < S(0.25)) && all(share > S(1e-12)); share = share * S(0.5)) {
+    for (; all(largest_magnitude(a) < S(0.25)) && all(share > S(1e-12)); share = share * S(0.5)) {
       a = joined(a, a);
     }
     for (int i = 0; i < Size; ++i) a(i, i) = a(i, i) + S(1.0);
     S radius(0.0);
     for (int squaring = 0; squaring < 40; ++squaring) {
-      const S size = largest(a);
+      const S size = largest_magnitude(a);
       if (!all(is_finite(size))) return S(-1.0);
       if (!all(size > smallest_normal<S>())) return S(1e3);  // all poles at zero
       radius = radius + share * log(size);
@@ -131,11 +124,8 @@ struct PartDesign {
       gain[i] = gains[0][i] / units[i];
       output[i] = output[i] * units[i];
       least = least + S(1e-6) * gain[i] * gain[i];
-      for (std::size_t j = 0; j < Size; ++j) {
-        S& x = step(static_cast<int>(i), static_cast<int>(j));
-        x = x * (units[j] / units[i]);
-      }
     }
+    step = in_units(step, units);
     const Square sample = corrected(step, output, gain);
     // Which V suits best depends on how far the poles are apart. A step in which it rises is added
     // to the sum of which P consists; that lets V fall there, and rise elsewhere. What the gain

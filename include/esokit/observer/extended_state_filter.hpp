@@ -301,7 +301,7 @@ class ExtendedStateFilter
   }
 
   static Expected<Law, Error<S>> design(const Config& config, const PlantModel& plant) {
-    return detail::FilterDesign<Law, PlantModel, has_model>::make(config, plant);
+    return detail::FilterDesign<Law, PlantModel, has_model, Config>::make(config, plant);
   }
 
   static constexpr std::size_t index(int i) noexcept { return static_cast<std::size_t>(i); }
