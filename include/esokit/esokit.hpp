@@ -156,6 +156,7 @@
 #include <esokit/sim/butcher_tableau.hpp>
 #include <esokit/sim/closed_loop.hpp>
 #include <esokit/sim/combined_signals.hpp>
+#include <esokit/sim/continuous_certificate.hpp>
 #include <esokit/sim/continuous_gain_law.hpp>
 #include <esokit/sim/continuous_observer.hpp>
 #include <esokit/sim/counted_gaussian.hpp>

@@ -73,19 +73,6 @@ constexpr S least_certified_gain(const EqualSampledPoles<Size, S>& poles) noexce
   return detail::least_factor<Size + 1>(detail::centre_power(poles));
 }
 
-/// The same for the continuous observer.
-template <int Size>
-constexpr double least_certified_gain() noexcept {
-  return detail::least_factor<Size + 1>(1.0);
-}
-
-/// (N-1) / (2N): with a k_min of at least this, every k_max is certified for the continuous
-/// observer.
-template <int Size>
-constexpr double unbounded_certified_gain() noexcept {
-  return (Size - 1.0) / (2.0 * Size);
-}
-
 /// k times a gain set.
 template <int Size, Scalar S, class Gain>
 constexpr Gain multiplied(Gain gain, const S& k) noexcept {

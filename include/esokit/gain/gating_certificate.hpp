@@ -86,54 +86,46 @@ namespace detail {
 template <int Size, Scalar S>
 struct ConstantLevel {
   Matrix<S, Size, Size> step;  ///< Phi - I
-  Array<S, Size> ahead{};      ///< C Phi
-  Array<S, Size> gain{};       ///< k
-  Array<S, Size> row{};        ///< the constant is `row` x
-  Array<S, Size> column{};     ///< change of x with the constant
+  Vector<S, Size> ahead;       ///< C Phi
+  Vector<S, Size> gain;        ///< k
+  Vector<S, Size> row;         ///< the constant is `row` x
+  Vector<S, Size> column;      ///< change of x with the constant
 
   /// That of a chain with one extended state.
   explicit ConstantLevel(const ScaledGain<Size, S>& of_chain)
-      : step(ChainModel<Size - 1, S>::increment()), gain(of_chain) {
-    ahead.fill(S(1.0));
-    row.fill(S(0.0));
-    row[Size - 1] = S(1.0);
-    column = row;
-  }
+      : step(ChainModel<Size - 1, S>::increment()),
+        ahead(Vector<S, Size>::Constant(S(1.0))),
+        gain(detail::column(of_chain)),
+        row(Matrix<S, Size, Size>::Identity().col(Size - 1)),
+        column(row) {}
 
   template <int Whole, int Pairs, class Model>
   ConstantLevel(const CorrectedPart<Size, Whole, Pairs, S>& part, const Model& model,
                 const ScaledGain<Whole, S>& of_model)
-      : step(part.step), ahead(output_ahead<Size>(part.output, part.step)) {
-    const auto constant_row = model.constant_row();
+      : step(part.step),
+        ahead(detail::column(output_ahead<Size>(part.output, part.step))),
+        row((detail::column(model.constant_row()).transpose() * part.whole).transpose()) {
     const auto constant_column = model.constant_column();
-    for (std::size_t j = 0; j < Size; ++j) {
-      const auto state = static_cast<std::size_t>(part.states[j]);
-      gain[j] = of_model[state];
-      column[j] = constant_column[state];
-      row[j] = S(0.0);
-      for (std::size_t i = 0; i < Whole; ++i) {
-        row[j] = row[j] + constant_row[i] * part.whole(static_cast<int>(i), static_cast<int>(j));
-      }
+    for (int j = 0; j < Size; ++j) {
+      const int state = part.states[static_cast<std::size_t>(j)];
+      gain(j) = of_model[static_cast<std::size_t>(state)];
+      column(j) = constant_column[static_cast<std::size_t>(state)];
     }
   }
 
   /// The correction of the constant by an innovation of one.
-  [[nodiscard]] S correction() const {
-    S found(0.0);
-    for (std::size_t i = 0; i < Size; ++i) found = found + row[i] * gain[i];
-    return found;
-  }
+  [[nodiscard]] S correction() const { return row.dot(gain); }
 
   /// A - I of the error dynamics with correction and leak. @param trust phi @param leak a
   [[nodiscard]] Matrix<S, Size, Size> error(const S& trust, const S& leak) const {
     const S found = correction();
     auto all = step;
-    for (std::size_t i = 0; i < Size; ++i) {
-      const S k = gain[i] - (S(1.0) - trust) * found * column[i];
-      for (std::size_t j = 0; j < Size; ++j) {
-        S& x = all(static_cast<int>(i), static_cast<int>(j));
+    for (int i = 0; i < Size; ++i) {
+      const S k = gain(i) - (S(1.0) - trust) * found * column(i);
+      for (int j = 0; j < Size; ++j) {
         // A prediction does not change the constant: row Phi = row.
-        x = x - k * ahead[j] - leak * column[i] * (row[j] - trust * found * ahead[j]);
+        all(i, j) =
+            all(i, j) - k * ahead(j) - leak * column(i) * (row(j) - trust * found * ahead(j));
       }
     }
     return all;
@@ -142,10 +134,7 @@ struct ConstantLevel {
   /// The steady error of the states under a constant d. @param d scaled @param leak a
   [[nodiscard]] Matrix<S, Size, 1> leak_error(const S& leak, const S& d) const {
     // (I - A) error = leak d.
-    Matrix<S, Size, 1> left;
-    const S leaking = leak * d;
-    for (int i = 0; i < Size; ++i) left(i) = leaking * column[static_cast<std::size_t>(i)];
-    return solved(-error(S(1.0), leak), left);
+    return solved(-error(S(1.0), leak), column * S(leak * d));
   }
 };
 
@@ -255,21 +244,15 @@ struct ErrorAfterHold {
     S before(0.0);
     all = largest = S(0.0);
     for (S& moved : change) {
-      S innovation(0.0);
-      S disturbance(0.0);
-      for (std::size_t j = 0; j < Size; ++j) {
-        innovation = innovation + level.ahead[j] * x[j];
-        disturbance = disturbance + level.row[j] * x[j];
-      }
+      const S innovation = level.ahead.dot(x);
+      const S disturbance = level.row.dot(x);
       moved = gain * (innovation - before);
       before = innovation;
       all = all + absolute(moved);
       if (absolute(disturbance) > largest) largest = absolute(disturbance);
       const auto now = x;
-      for (std::size_t r = 0; r < Size; ++r) {
-        for (std::size_t j = 0; j < Size; ++j) {
-          x[r] = x[r] + error(static_cast<int>(r), static_cast<int>(j)) * now[j];
-        }
+      for (int r = 0; r < Size; ++r) {
+        for (int j = 0; j < Size; ++j) x(r) = x(r) + error(r, j) * now(j);
       }
     }
   }

@@ -132,7 +132,7 @@ struct PartDesign {
     // does not move, as a lag that is only computed, has an error all the same.
     constexpr int rounds = 8;
     for (const double share : {1.0, 0.2}) {
-      Square spread = squared<Size, S>(gain);
+      Square spread = column(gain) * column(gain).transpose();
       for (int i = 0; i < Size; ++i) spread(i, i) = spread(i, i) + least;
       for (int round = 0; round < rounds && longest_step < Longest; ++round) {
         const S rate = S(share) * decay;
@@ -166,13 +166,9 @@ struct PartDesign {
       for (int halvings = 0; samples < next; ++halvings, noise = noise * S(0.5)) {
         if (halvings == 16) break;
         S innovation = noise;
-        for (std::size_t row = 0; row < Size; ++row) {
-          gain[row] = S(0.0);
-          for (std::size_t j = 0; j < Size; ++j) {
-            gain[row] = gain[row] + grown(static_cast<int>(row), static_cast<int>(j)) * output[j];
-          }
+        gain = elements(grown * column(output));
+        for (std::size_t row = 0; row < Size; ++row)
           innovation = innovation + output[row] * gain[row];
-        }
         for (S& k : gain) k = k / innovation;
         Square longer = over;
         for (samples = first; samples < next; ++samples) {
@@ -251,13 +247,7 @@ class ModelGain {
                         index};
       }
       for (std::size_t gap = 0; gap < law.gains_.size(); ++gap) {
-        for (int i = 0; i < Size; ++i) {
-          S sum(0.0);
-          for (std::size_t j = 0; j < design.gains[gap].size(); ++j) {
-            sum = sum + part.whole(i, static_cast<int>(j)) * design.gains[gap][j];
-          }
-          law.gains_[gap][static_cast<std::size_t>(i)] = sum;
-        }
+        law.gains_[gap] = detail::elements(part.whole * detail::column(design.gains[gap]));
       }
       law.longest_step_ = design.longest_step;
       return law;

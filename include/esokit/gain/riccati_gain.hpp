@@ -312,9 +312,7 @@ class RiccatiGain {
   ESOKIT_INLINE constexpr void advance_alone() noexcept {
     if (rests()) [[likely]] {
       note(standing);
-      if constexpr (TableSize > 0) {
-        if (place_ <= TableSize) next_of_table();
-      }
+      if (TableSize > 0 && place_ <= TableSize) next_of_table();
     } else {
       recur();
     }

@@ -66,8 +66,8 @@ bool same_half_plane(const ErrorPolynomial<Size, S>& p, const ErrorPolynomial<Si
 
 /// True if the errors of two gain sets of one observer share a quadratic Lyapunov function. Then
 /// every gain on the segment between them is stable, however it varies.
-/// @param first, second scaled current-estimator gains of a sampled observer, or l of a continuous
-///        one, N x 1, row i in 1/s^(i+1)
+/// @param first, second scaled current-estimator gains of a sampled observer, or with
+///        sim/continuous_certificate.hpp l of a continuous one, N x 1, row i in 1/s^(i+1)
 template <int Size, Scalar S, class Gain>
 [[nodiscard]] bool switching_certified(const Gain& first, const Gain& second) {
   const S unit = S(0.5) * (frequency_scale<Size, S>(first) + frequency_scale<Size, S>(second));

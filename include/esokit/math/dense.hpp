@@ -110,6 +110,22 @@ constexpr Array<S, Size> characteristic(const Matrix<S, Size, Size>& a, const Ea
   return all;
 }
 
+/// A column of these elements, and the elements of a column.
+/// @{
+template <class S, std::size_t Size>
+constexpr Vector<S, static_cast<int>(Size)> column(const std::array<S, Size>& x) noexcept {
+  Vector<S, static_cast<int>(Size)> all;
+  for (int i = 0; i < all.size(); ++i) all(i) = x[static_cast<std::size_t>(i)];
+  return all;
+}
+template <class S, int Size>
+constexpr Array<S, Size> elements(const Vector<S, Size>& x) noexcept {
+  Array<S, Size> all{};
+  for (int i = 0; i < Size; ++i) all[static_cast<std::size_t>(i)] = x(i);
+  return all;
+}
+/// @}
+
 /// A^-1 B for a symmetric positive definite A, by Cholesky; nothing if A is not positive definite.
 template <int Size, int Columns, Scalar S>
 std::optional<Matrix<S, Size, Columns>> solve_positive(const Matrix<S, Size, Size>& a,

@@ -179,10 +179,7 @@ struct LinearPlant {
       return first_gain(0).gain(0);
     } else {
       Matrix<ScalarType, Outputs, Inputs> gains;
-      for (int i = 0; i < Outputs; ++i) {
-        const auto row = first_gain(i).gain;
-        for (int j = 0; j < Inputs; ++j) gains(i, j) = row(j);
-      }
+      for (int i = 0; i < Outputs; ++i) detail::set_block(gains, i, 0, first_gain(i).gain);
       return gains;
     }
   }
@@ -269,14 +266,10 @@ constexpr Expected<LinearPlant<States + More, S, Inputs, Outputs>, Error<S>> wit
 template <int States, Scalar S, int Inputs, int Outputs>
 constexpr Expected<LinearPlant<States + Inputs, S, Inputs, Outputs>, Error<S>> with_lag(
     const LinearPlant<States, S, Inputs, Outputs>& plant, const S& time_constant) {
-  return detail::with_first_order<Inputs>(plant, time_constant, [](auto& p, const S& rate) {
-    for (int j = 0; j < Inputs; ++j) {
-      for (int i = 0; i < States; ++i) {
-        p.a(i, States + j) = p.b(i, j);
-        p.b(i, j) = S(0.0);
-      }
-      p.b(States + j, j) = rate;
-    }
+  return detail::with_first_order<Inputs>(plant, time_constant, [&](auto& p, const S& rate) {
+    detail::set_block(p.a, 0, States, plant.b);
+    p.b = Matrix<S, States + Inputs, Inputs>::Zero();
+    detail::set_block(p.b, States, 0, Matrix<S, Inputs, Inputs>::Identity() * rate);
   });
 }
 
@@ -286,14 +279,10 @@ constexpr Expected<LinearPlant<States + Inputs, S, Inputs, Outputs>, Error<S>> w
 template <int States, Scalar S, int Inputs, int Outputs>
 constexpr Expected<LinearPlant<States + Outputs, S, Inputs, Outputs>, Error<S>> with_sensor(
     const LinearPlant<States, S, Inputs, Outputs>& plant, const S& time_constant) {
-  return detail::with_first_order<Outputs>(plant, time_constant, [](auto& p, const S& rate) {
-    for (int j = 0; j < Outputs; ++j) {
-      for (int i = 0; i < States; ++i) {
-        p.a(States + j, i) = p.c(j, i) * rate;
-        p.c(j, i) = S(0.0);
-      }
-      p.c(j, States + j) = S(1.0);
-    }
+  return detail::with_first_order<Outputs>(plant, time_constant, [&](auto& p, const S& rate) {
+    detail::set_block(p.a, States, 0, plant.c * rate);
+    p.c = Matrix<S, Outputs, States + Outputs>::Zero();
+    detail::set_block(p.c, 0, States, Matrix<S, Outputs, Outputs>::Identity());
   });
 }
 

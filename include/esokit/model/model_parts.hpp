@@ -208,6 +208,13 @@ void check_sensor(Rules<S>& rules, const Lag<Order, S>& sensor, const S& time) {
             "model.sensor.damping", sensor, time);
 }
 
+/// Element `index` must differ from those before it, of which `other` is one.
+template <PlainScalar S>
+void check_apart(Rules<S>& rules, const char* field, const S& value, int index, const S& other) {
+  rules.require(absolute(S(value - other)) > S(1e-3) * value,
+                {field, value, "must differ by a thousandth of itself from", index, other, true});
+}
+
 template <PlainScalar S, std::size_t Sines>
 void check_resonators(Rules<S>& rules, const std::array<Resonance<S>, Sines>& resonators,
                       const S& time) {
@@ -222,10 +229,8 @@ void check_resonators(Rules<S>& rules, const std::array<Resonance<S>, Sines>& re
             "model.resonators.damping", resonance.damping, "must be 0 or above, below 1", c)
         .not_negative("model.resonators.capture_bandwidth", resonance.capture_bandwidth, c);
     for (std::size_t before = 0; before < i; ++before) {
-      const S& other = resonators[before].frequency;
-      rules.require(absolute(S(resonance.frequency - other)) > S(1e-3) * resonance.frequency,
-                    {"model.resonators.frequency", resonance.frequency,
-                     "must differ by a thousandth of itself from", c, other, true});
+      check_apart(rules, "model.resonators.frequency", resonance.frequency, c,
+                  resonators[before].frequency);
     }
   }
 }
@@ -240,10 +245,7 @@ void check_first_order(Rules<S>& rules, const std::array<S, FirstOrders>& first_
         .require(tau * S(100) >= time, "model.first_order", tau,
                  "must be at least a hundredth of sample_time", c);
     for (std::size_t before = 0; before < i; ++before) {
-      const S& other = first_order[before];
-      rules.require(
-          absolute(S(tau - other)) > S(1e-3) * tau,
-          {"model.first_order", tau, "must differ by a thousandth of itself from", c, other, true});
+      check_apart(rules, "model.first_order", tau, c, first_order[before]);
     }
   }
 }

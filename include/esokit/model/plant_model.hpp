@@ -268,10 +268,7 @@ requires(Parts.states > 0)  //
       }
     }
     for (row = States + Shape::replaced; row < inner; ++row) {
-      rows(row, row) = S(1);
-      for (int j = 1; j <= Base::degree(lf + row); ++j) {
-        rows(row, row) = rows(row, row) * (this->sample_time_ / static_cast<S>(j));
-      }
+      rows(row, row) = this->of_degree(Base::degree(lf + row), S(1));
     }
     return rows;
   }
@@ -333,13 +330,11 @@ requires(Parts.states > 0)  //
   /// The states without the sensor's, and with them. @param shown by the sensor
   /// @{
   static Vector<S, inner> without_sensor(const State& x) noexcept {
-    Vector<S, inner> state;
-    for (int i = 0; i < inner; ++i) state(i) = x[static_cast<std::size_t>(lf + i)];
-    return state;
+    return detail::column(x).template segment<inner>(lf);
   }
   static State with_sensor(const Vector<S, inner>& state, const S& shown = S(0)) noexcept {
     State x{};
-    if constexpr (lf > 0) x[0] = shown;
+    x[0] = shown;  // without a sensor it is replaced below
     for (int i = 0; i < inner; ++i) x[static_cast<std::size_t>(lf + i)] = state(i);
     return x;
   }
