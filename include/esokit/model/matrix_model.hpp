@@ -38,6 +38,7 @@ class MatrixModel {
   static constexpr int size = Shape::size;                    ///< N
   static constexpr int extension = size - order;              ///< all rows besides the plant's
   static constexpr int measured_rows = Shape::measured_rows;  ///< states of a sensor
+
   /// Row of the estimate that is measured: y, or as the sensor shows it.
   static constexpr int measured_row = measured_rows > 0 ? size - measured_rows : 0;
 
