@@ -137,7 +137,6 @@
 #include <esokit/model/model_parts.hpp>
 #include <esokit/model/parts_shape.hpp>
 #include <esokit/model/plant_model.hpp>
-#include <esokit/model/plant_shape.hpp>
 #include <esokit/model/sampled_model.hpp>
 #include <esokit/model/scaled_chain.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
@@ -159,6 +158,7 @@
 #include <esokit/sim/butcher_tableau.hpp>
 #include <esokit/sim/closed_loop.hpp>
 #include <esokit/sim/combined_signals.hpp>
+#include <esokit/sim/continuous_certificate.hpp>
 #include <esokit/sim/continuous_gain_law.hpp>
 #include <esokit/sim/continuous_observer.hpp>
 #include <esokit/sim/counted_gaussian.hpp>

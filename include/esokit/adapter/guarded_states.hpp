@@ -236,7 +236,7 @@ struct GuardedStates {
     return with_level(observer, level, [&](const auto&, const auto& corrected) -> Proven {
       bool certified;
       if constexpr (on_chain) {
-        certified = gating_certified<size, S>(corrected.gain, leak);
+        certified = gating_certified<size, S>(detail::elements(corrected.gain), leak);
       } else {
         certified = gating_certified(corrected, leak);
       }
