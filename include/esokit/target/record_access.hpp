@@ -618,10 +618,10 @@ struct RecordAccess {
   template <class O>
   static std::vector<double> line(const O& o) {
     std::vector<double> inputs;
-    const int length = static_cast<int>(o.inputs_.size());
-    for (int age = o.delay_; age >= 0; --age) {
-      const int at = (o.newest_ - age + length) % length;
-      inputs.push_back(static_cast<double>(o.inputs_[static_cast<std::size_t>(at)]));
+    const int length = static_cast<int>(o.rest_.inputs.size());
+    for (int age = o.rest_.delay; age >= 0; --age) {
+      const int at = (o.rest_.newest - age + length) % length;
+      inputs.push_back(static_cast<double>(o.rest_.inputs[static_cast<std::size_t>(at)]));
     }
     return inputs;
   }
