@@ -145,11 +145,13 @@
 #include <esokit/observer/concepts.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/half_gain_eso.hpp>
+#include <esokit/observer/level_numbers.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/mimo_extended_state_filter.hpp>
 #include <esokit/observer/model_eso.hpp>
 #include <esokit/observer/named_observer.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
+#include <esokit/observer/observed_levels.hpp>
 #include <esokit/observer/predictor_corrector.hpp>
 #include <esokit/observer/reduced_order_eso.hpp>
 #include <esokit/observer/steady_state.hpp>
