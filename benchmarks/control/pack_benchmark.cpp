@@ -3,6 +3,7 @@
 /// written by hand with the same check; and what one bad lane a pack costs. Times are of a lane.
 /// Packs are for AVX: run it with --flags "-O2 -march=x86-64-v3" too.
 #include <cstddef>
+#include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/core/packed.hpp>
@@ -126,6 +127,25 @@ ExtendedStateFilter<2, S> filter(RiccatiMode mode) {
       .value();
 }
 
+template <class S>
+DelayedInput<LinearEso<2, S>, 8> delayed() {
+  return DelayedInput<LinearEso<2, S>, 8>::make(
+             {.observer = {.observer_bandwidth = S(60), .input_gain = S(2), .sample_time = S(1e-3)},
+              .delay = 3})
+      .value();
+}
+
+template <class S>
+Adrc<DelayedInput<LinearEso<2, S>, 8>> delayed_adrc() {
+  return Adrc<DelayedInput<LinearEso<2, S>, 8>>::make(
+             {.observer = {.observer = {.observer_bandwidth = S(60),
+                                        .input_gain = S(2),
+                                        .sample_time = S(1e-3)},
+                           .delay = 3},
+              .controller_bandwidth = S(5)})
+      .value();
+}
+
 /// One by one.
 template <class S>
 Adrc<WrappedOutput<LinearEso<2, S>>> angle() {
@@ -219,6 +239,11 @@ void add_all(const std::string& scalar) {
     const auto mode = frozen ? RiccatiMode::frozen : RiccatiMode::recursive;
     both(frozen ? "frozen_filter/2" : "filter/2", filter<One>(mode), " <= 1.0");
   }
+  // Beside the observer alone: one element of the line is read and one written, u is tested, and
+  // whether the lanes agree on where.
+  both("delayed_input/2", delayed<One>(),
+       " <= 1.0; vs bank64/linear_eso/2/pack_of_" + scalar + " <= 1.7");
+  both("adrc_of_delayed_input/2", delayed_adrc<One>(), " <= 1.0");
   both("adrc_of_angle/2", angle<One>(), "");
   const std::string bad = "one_bad_lane/";
   const auto bad_label = [&](const std::string& what) {

@@ -1,7 +1,8 @@
 // A Packed is so many of its type: every answer, with settings, faults and retunes of each lane its
-// own. Of what goes lane by lane: adapters, and what goes around them; the controllers and filters
-// of several channels; the differentiators. And of what works on packs itself without an observer:
-// the filter form, the nonlinear feedback. Observers: observer/pack_test.cpp, Adrc: pack_test.cpp.
+// own. Of what goes lane by lane: most adapters, and what goes around them; the controllers and
+// filters of several channels; the differentiators. Of what works on packs itself: DelayedInput,
+// and without an observer the nonlinear feedback. Observers: observer/pack_test.cpp, Adrc:
+// pack_test.cpp.
 #include <gtest/gtest.h>
 
 #include <esokit/adapter/delayed_input.hpp>
@@ -65,12 +66,22 @@ auto linear(int lane, bool again) {
   return config;
 }
 
-struct Delayed {
-  using Type = esokit::DelayedInput<LinearEso<1>, 4>;
-  static Type::Config config(int lane, bool again) {
-    return {.observer = linear(lane, again), .delay = 2};
+/// @tparam First d of lane 0, with `again` one more @tparam Second of lane 1
+template <class Observer, int First = 2, int Second = 2>
+struct DelayedBy {
+  using Type = esokit::DelayedInput<Observer, 4>;
+  static typename Type::Config config(int lane, bool again) {
+    typename Type::Config config{};
+    auto& observer = config.observer;
+    observer.input_gain = set(lane, again, -2);
+    observer.sample_time = set(lane, false, 0.01);
+    observer.max_gap = 4;
+    observer.observer_bandwidth = set(lane, again, 30);
+    config.delay = (lane == 0 ? First : Second) + (again ? 1 : 0);
+    return config;
   }
 };
+using Delayed = DelayedBy<LinearEso<1>>;
 
 struct Told {
   using Type = esokit::Measured<LinearEso<1>, 1, 4>;
@@ -301,11 +312,35 @@ TEST(Packed, Measured) {
       [](const auto& o) { return seen(o).and_also(o.known_part(), o.residual_disturbance()); });
 }
 
+const auto observe_late = [](auto& o, const auto& x, int k) {
+  if (k % 50 == 20) on(o, x, [](auto& one, const auto& now) { one.fill_input(now[1]); });
+  return observe(o, x, k);
+};
+
 TEST(Packed, DelayedInput) {
+  static_assert(Packed<Delayed::Type, lanes>::at_once);
+  expect_lanes<Delayed>(observe_late, seen);
+  expect_lanes<DelayedBy<LinearEso<1>, 0, 0>>(observe_late, seen);
+  expect_lanes<DelayedBy<LinearEso<1>, 3, 1>>(observe_late, seen);
+  // A law that advances before the step.
+  using Advancing = esokit::AdjustableBandwidthEso<1>;
+  static_assert(Packed<DelayedBy<Advancing>::Type, lanes>::at_once);
+  expect_lanes<DelayedBy<Advancing>>(observe_late, seen);
+  expect_lanes<DelayedBy<Advancing, 1, 2>>(observe_late, seen);
+  // One that has no form on packs.
+  static_assert(!Packed<esokit::DelayedInput<GatedAngle::Type, 4>, lanes>::at_once);
+}
+
+TEST(Packed, LanesAtOtherPlacesInTheDelayLine) {
   expect_lanes<Delayed>(
       [](auto& o, const auto& x, int k) {
-        if (k % 50 == 20) on(o, x, [](auto& one, const auto& now) { one.fill_input(now[1]); });
-        return observe(o, x, k);
+        // Lane 1, which has the longer sample time, is predicted once more.
+        if (k % 60 == 40) {
+          on(o, x, [](auto& one, const auto& now) {
+            if (one.sample_time() > 0.011) (void)one.predict(now[3]);
+          });
+        }
+        return observe_late(o, x, k);
       },
       seen);
 }
@@ -369,6 +404,12 @@ const auto controlled = [](const auto& c) {
 TEST(Packed, AdrcOfAnAngle) {
   expect_lanes<InAdrc<GatedAngle>>(control,
                                    [](const auto& c) { return controlled(c).and_also(c.gains()); });
+}
+
+TEST(Packed, AdrcOfADelayedInput) {
+  static_assert(Packed<InAdrc<Delayed>::Type, lanes>::at_once);
+  expect_lanes<InAdrc<Delayed>>(control, controlled);
+  expect_lanes<InAdrc<DelayedBy<LinearEso<1>, 0, 3>>>(control, controlled);
 }
 
 TEST(Packed, AdrcOfAGatedModel) { expect_lanes<InAdrc<GatedModel>>(control, controlled); }

@@ -474,7 +474,7 @@ TEST(MonteCarlo, AsksEveryControllerForPacks) {
   EXPECT_EQ(lanes_of<DisturbanceCompensator<Swinging>>(swing), 4);
   EXPECT_EQ(lanes_of<Adrc<Own>>(), 1);
   EXPECT_EQ(lanes_of<Adrc<Guarded<LinearEso<2>>>>(), 1);
-  EXPECT_EQ((lanes_of<Adrc<DelayedInput<LinearEso<2>, 4>>>()), 1);
+  EXPECT_EQ((lanes_of<Adrc<DelayedInput<LinearEso<2>, 4>>>()), 4);
   EXPECT_EQ(lanes_of<Adrc<VariableTime<LinearEso<2>>>>(), 1);
   EXPECT_EQ(lanes_of<Adrc<OutlierGate<LinearEso<2>>>>(), 1);
   EXPECT_EQ((lanes_of<Adrc<PlantEso<2, ModelParts{.order = 2}>>>(

@@ -40,9 +40,6 @@ template <LoopObserver Observer>
 class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Observer> {
   friend struct detail::GuardAccess;
   friend struct detail::LaneAccess;
-  static_assert(
-      PlainScalar<typename Observer::scalar_type> || records<typename Observer::scalar_type>,
-      "esokit: an adapter is of plain scalars; for packs: Packed<DelayedInput<..>, lanes>");
 
  public:
   using Adapted = Observer;                            ///< what is adapted
@@ -81,7 +78,9 @@ class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Ob
   [[nodiscard]] constexpr scalar_type sample_time() const noexcept {
     return observer_.sample_time();
   }
-  [[nodiscard]] constexpr int missed() const noexcept { return observer_.missed(); }
+  [[nodiscard]] constexpr Lanes<int, scalar_type> missed() const noexcept {
+    return observer_.missed();
+  }
   [[nodiscard]] constexpr int max_gap() const noexcept { return observer_.max_gap(); }
   [[nodiscard]] constexpr Estimate equilibrium(const scalar_type& y,
                                                const scalar_type& u) const noexcept {
@@ -210,6 +209,7 @@ class NamedAdapter : public Adapter<Observer> {
   /// Checks the settings and does all the design work.
   /// @return the adapter, with its observer at rest at zero, or an error that names the field
   static Expected<Self, Error<scalar_type>> make(const Config& config) {
+    detail::refuse_packs<scalar_type>();
     if (Check<scalar_type> ok = Self::check(config); !ok) return ok.error();
     const auto observer = Observer::make(config.observer);
     if (!observer) return observer.error();

@@ -48,13 +48,6 @@ struct PerLane {
   /// True if all lanes are equal.
   ESOKIT_INLINE friend constexpr bool operator==(const PerLane& a, const PerLane& b) noexcept {
     if constexpr (std::has_unique_object_representations_v<PerLane>) {
-      // Compared as machine words: for an array compilers call memcmp.
-      constexpr std::size_t size = sizeof(PerLane);
-      using Word = std::conditional_t<
-          size % 8 == 0, std::uint64_t,
-          std::conditional_t<size % 4 == 0, std::uint32_t,
-                             std::conditional_t<size % 2 == 0, std::uint16_t, std::uint8_t>>>;
-      using Words = std::array<Word, size / sizeof(Word)>;
       const auto of_a = std::bit_cast<Words>(a);
       const auto of_b = std::bit_cast<Words>(b);
       Word differs = 0;
@@ -66,6 +59,23 @@ struct PerLane {
       return a.values == b.values;
     }
   }
+
+  /// Whether all lanes hold the same; of integers.
+  ESOKIT_INLINE friend constexpr bool agree(const PerLane& each) noexcept {
+    const auto words = std::bit_cast<Words>(each);
+    auto differs = static_cast<Word>(words[0] ^ std::rotl(words[0], 8 * int{sizeof(T)}));
+    for (const Word& word : words) differs = static_cast<Word>(differs | (word ^ words[0]));
+    return differs == 0;
+  }
+
+ private:
+  // Compared as machine words: for an array compilers call memcmp.
+  using Word =
+      std::conditional_t<sizeof(T) * Count % 8 == 0, std::uint64_t,
+                         std::conditional_t<sizeof(T) * Count % 4 == 0, std::uint32_t,
+                                            std::conditional_t<sizeof(T) * Count % 2 == 0,
+                                                               std::uint16_t, std::uint8_t>>>;
+  using Words = std::array<Word, sizeof(T) * Count / sizeof(Word)>;
 };
 
 /// One T for each lane of S: T itself if S is a plain scalar.
@@ -240,9 +250,9 @@ constexpr void copy_lane(Packed& packed, Plain& plain, int i) noexcept {
       });
     });
   } else if constexpr (Back) {
-    packed[i] = plain;
+    packed[i] = static_cast<std::remove_cvref_t<decltype(packed[i])>>(plain);
   } else {
-    plain = packed[i];
+    plain = static_cast<Plain>(packed[i]);
   }
 }
 

@@ -9,7 +9,7 @@
 namespace esokit::detail {
 
 /// @tparam Law a RiccatiGain @tparam has_model the disturbance has a nominal model
-template <class Law, class PlantModel, bool has_model>
+template <class Law, class PlantModel, bool has_model, class Config>
 class FilterDesign {
   using S = typename Law::scalar_type;
   static constexpr int Order = PlantModel::order;
@@ -18,10 +18,13 @@ class FilterDesign {
 
  public:
   /// The law, or an error. Sample time and input gain of the config are already checked.
-  template <class Config>
   static Expected<Law, Error<S>> make(const Config& config, const PlantModel& plant) {
     Rules<S> rules;
-    rules.all_of(check_rule(config)).not_negative("outlier_threshold", config.outlier_threshold);
+    rules.all_of(check_inflation<S>(config));
+    if (config.inflation_rule == InflationRule::adaptive) {
+      rules.positive("trace_weights", config.trace_weights);
+    }
+    rules.not_negative("outlier_threshold", config.outlier_threshold);
     if (!rules) return rules.error();
     auto settings = law_settings(config, plant);
     if (!settings) return settings.error();
@@ -45,16 +48,6 @@ class FilterDesign {
  private:
   static constexpr std::size_t index(int i) noexcept { return static_cast<std::size_t>(i); }
 
-  template <class Config>
-  static Check<S> check_rule(const Config& config) {
-    Rules<S> rules;
-    rules.all_of(check_inflation<S>(config));
-    if (config.inflation_rule == InflationRule::adaptive) {
-      rules.positive("trace_weights", config.trace_weights);
-    }
-    return rules;
-  }
-
   /// Factors from the rows of the estimate to the states of the law (T^r / r! for the chain),
   /// divided by `root`, the root of the unit of variances.
   static Array<S, N> scaled_units(const PlantModel& plant, const S& root) {
@@ -66,7 +59,6 @@ class FilterDesign {
     return units;
   }
 
-  template <class Config>
   static Expected<RiccatiSettings<N, S>, Error<S>> law_settings(const Config& config,
                                                                 const PlantModel& plant) {
     using std::sqrt;
@@ -136,14 +128,12 @@ class FilterDesign {
                                  .trace_weights = config.trace_weights};
   }
 
-  template <class Config>
   static int place_of_highest(const Config& config) noexcept {
     return config.process_covariance ? N * N - 1 : N - 1;
   }
 
   /// A state that is known exactly is never corrected, and one that is never disturbed is corrected
   /// less and less.
-  template <class Config>
   static Check<S> check_way_back(const Config& config, const Covariance& q) {
     const S& highest = q(N - 1, N - 1);
     // In a composed model it depends on the parts which state is the highest; a known actuator need
@@ -166,7 +156,6 @@ class FilterDesign {
     return {};
   }
 
-  template <class Config>
   static Check<S> check_alternating(const Config& config, const CovarianceFactor<N, S>& noise,
                                     const S& unit, const PlantModel& plant) {
     if (config.inflation_rule == InflationRule::adaptive || all(config.inflation >= S(0.01))) {
@@ -178,7 +167,6 @@ class FilterDesign {
     return alternating("measurement_variance", r, -1, S(least * unit));
   }
 
-  template <class Config>
   static Check<S> freeze(Law& law, const Config& config) {
     const char* field = noise_field(config);
     const S highest = config.process_covariance ? (*config.process_covariance)(N - 1, N - 1)

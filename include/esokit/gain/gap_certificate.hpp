@@ -69,18 +69,6 @@ class FallingSquare {
   S margin_{};
 };
 
-/// k k'.
-template <int Size, Scalar S>
-Matrix<S, Size, Size> squared(const Array<S, Size>& gain) noexcept {
-  Matrix<S, Size, Size> square;
-  for (int i = 0; i < Size; ++i) {
-    for (int j = 0; j < Size; ++j) {
-      square(i, j) = gain[static_cast<std::size_t>(i)] * gain[static_cast<std::size_t>(j)];
-    }
-  }
-  return square;
-}
-
 /// The longest step of the chain, in samples, with the gains of `poles` after gaps: each one up to
 /// 20 samples is tested, then steps that grow by a twentieth.
 /// @param unit a, largest abs(1 - rho_i) @param decay -ln of the largest abs(rho_i)
@@ -112,10 +100,11 @@ int longest_falling_step(const Poles& poles, const S& unit, const S& decay) {
     return all;
   };
   const auto [one, gain] = step(1);
+  const auto k = column(gain);
   int longest = 1;
   // The discount that suits best depends on how far the poles are apart.
   for (const S share : {S(0.5), S(1), S(1.5)}) {
-    const auto square = FallingSquare<Size, S>::make(one, squared<Size, S>(gain), S(share * decay));
+    const auto square = FallingSquare<Size, S>::make(one, k * k.transpose(), S(share * decay));
     if (!square) continue;
     for (int samples = 2; samples <= most_bridged; samples += 1 + samples / 20) {
       if (!square->falls(step(samples).first)) break;
