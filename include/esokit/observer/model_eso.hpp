@@ -51,11 +51,13 @@ constexpr ModelParts of_plant(ModelParts parts, int states) noexcept {
 ///                       .model = {.plant = plant, .resonators = {{{.frequency = 314}}}}});
 /// ```
 template <int States, ModelParts Parts, Scalar S = double, class Placement = EqualPoles>
-using PlantEso = ModelEso<detail::of_plant(Parts, States), S, Placement>;
+requires(States >= 1)  //
+    using PlantEso = ModelEso<detail::of_plant(Parts, States), S, Placement>;
 
 /// CascadeEso with the same model.
 template <int States, ModelParts Parts, int Levels, Scalar S = double, class Placement = EqualPoles>
-using PlantCascadeEso = ModelCascadeEso<detail::of_plant(Parts, States), Levels, S, Placement>;
+requires(States >= 1)  //
+    using PlantCascadeEso = ModelCascadeEso<detail::of_plant(Parts, States), Levels, S, Placement>;
 
 /// The parts of a disturbance at the present time, each in the unit of d: that of y^(n), or with
 /// ModelParts::states the one defined by E.
