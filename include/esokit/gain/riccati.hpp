@@ -113,11 +113,8 @@ ScaledGain<Size, S> deadbeat_gain(const PascalTransition&) {
 }
 template <int Size, Scalar S>
 ScaledGain<Size, S> deadbeat_gain(const MatrixTransition<Size, S>& transition) {
-  Array<S, Size> output{};
-  output.fill(S(0.0));
-  output[0] = S(1.0);
-  return placed_gain(transition.increment(), output, transition.degrees,
-                     pole_factors(EqualSampledPoles<Size, S>{S(1.0)}));
+  return placed_gain(transition.increment(), elements(Matrix<S, Size, Size>::Identity().col(0)),
+                     transition.degrees, pole_factors(EqualSampledPoles<Size, S>{S(1.0)}));
 }
 
 /// C (-I - Phi)^-1; Phi of the chain is upper triangular.

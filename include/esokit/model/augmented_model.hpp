@@ -181,10 +181,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   }
   /// The constant part of d, unit of y^(n): D without the plant, the actuator and the other parts.
   [[nodiscard]] S constant(const Estimate& z) const noexcept {
-    const auto x = this->scaled(z);
-    const auto row = constant_row();
-    S sum(0);
-    for (std::size_t j = 0; j < row.size(); ++j) sum = sum + row[j] * x[j];
+    S sum = detail::column(constant_row()).dot(detail::column(this->scaled(z)));
     for (int j = n; j > 0; --j) sum = sum * (static_cast<S>(j) * rate_);
     return sum;
   }
@@ -210,10 +207,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   }
   /// The change of the states x per unit of this constant, with all other natural states kept.
   [[nodiscard]] State constant_column() const noexcept {
-    const auto part = corrected_part<without(true, false)>();
-    State column{};
-    for (int i = 0; i < size; ++i) column[static_cast<std::size_t>(i)] = part.whole(i, lf + n);
-    return column;
+    return detail::elements(corrected_part<without(true, false)>().whole.col(lf + n));
   }
   /// The rows by which the states x give the contribution of the actuator's output to the states
   /// y^(n) .. D.
@@ -225,17 +219,13 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
     // The states of the part are those of the model, except this one, which follows from the
     // constant.
     auto natural = Matrix<S, part_size, size>::Zero();
-    const State row = constant_row();
-    for (int j = 0; j < size; ++j) natural(acted_on, j) = row[static_cast<std::size_t>(j)];
+    const auto row = detail::column(constant_row());
+    detail::set_block(natural, acted_on, 0, row.transpose());
     for (int k = 0; k < part_size; ++k) {
       if (k == acted_on) continue;
       const int state = part.states[static_cast<std::size_t>(k)];
       natural(k, state) = S(1);
-      S weight(0);
-      for (int i = 0; i < size; ++i) {
-        weight = weight + row[static_cast<std::size_t>(i)] * part.whole(i, k);
-      }
-      natural(acted_on, state) = natural(acted_on, state) - weight;
+      natural(acted_on, state) = natural(acted_on, state) - row.dot(part.whole.col(k));
     }
     Matrix<S, la + 1, size> rows;
     for (int i = 0; i <= la; ++i) {
