@@ -47,6 +47,11 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   static constexpr int la = Parts.actuator;
   static constexpr int lf = Parts.sensor;
   static constexpr int m = Parts.constants;
+  static_assert(n >= 1, "esokit: the plant order must be at least 1");
+  static_assert(m >= 1, "esokit: at least one extended state is needed");
+  static_assert(la >= 0 && la <= 2 && lf >= 0 && lf <= 2, "esokit: a lag has order 0, 1 or 2");
+  static_assert(Parts.resonators >= 0 && Parts.first_order >= 0,
+                "esokit: the number of parts must not be negative");
   static_assert(Parts.states == 0, "esokit: a whole plant needs model/plant_model.hpp");
 
  public:
