@@ -31,4 +31,4 @@ set(esokit_units
     "sim/closed_loop sim/dormand_prince sim/metrics sim/noise sim/plant sim/refused_config sim/runge_kutta sim/signals"
     "sim/counted_gaussian sim/run sim/study_records"
     "target/health_code target/profile_code"
-    "tune/pid_conversion tune/tune")
+    "tune/pid_conversion tune/tune tune/update_operations")
