@@ -48,15 +48,10 @@ class FilterDesign {
  private:
   static constexpr std::size_t index(int i) noexcept { return static_cast<std::size_t>(i); }
 
-  /// Factors from the rows of the estimate to the states of the law (T^r / r! for the chain),
+  /// For each state of the law the factor from its row of the estimate (T^r / r! for the chain),
   /// divided by `root`, the root of the unit of variances.
   static Array<S, N> scaled_units(const PlantModel& plant, const S& root) {
-    typename PlantModel::Estimate ones;
-    for (int r = 0; r < N; ++r) ones(r) = S(1.0) / root;
-    const auto states = plant.scaled(ones);
-    Array<S, N> units;
-    for (int r = 0; r < N; ++r) units[index(r)] = states[index(PlantModel::state_of_row(r))];
-    return units;
+    return plant.scaled(PlantModel::Estimate::Constant(S(1.0) / root));
   }
 
   static Expected<RiccatiSettings<N, S>, Error<S>> law_settings(const Config& config,
@@ -87,7 +82,8 @@ class FilterDesign {
       driven = driven || all(q(i, i) > S(0.0));
       if (all(r > S(0.0))) continue;
       for (const S& variance : {q(i, i), config.initial_covariance(i, i)}) {
-        const S seen = (variance * plain[index(i)]) * plain[index(i)];
+        const S& factor = plain[index(PlantModel::state_of_row(i))];
+        const S seen = (variance * factor) * factor;
         unit = select(unit < seen, seen, unit);
       }
     }
@@ -102,15 +98,13 @@ class FilterDesign {
     const auto in_law = [&units](const char* field, const Covariance& p) {
       // The config is in rows of the estimate, the law in states of the model.
       Covariance of_states;
-      Array<S, N> units_of_states;
       for (int i = 0; i < N; ++i) {
-        units_of_states[index(PlantModel::state_of_row(i))] = units[index(i)];
         for (int j = 0; j < N; ++j) {
           of_states(PlantModel::state_of_row(i), PlantModel::state_of_row(j)) = p(i, j);
         }
       }
       return factored<N, S>(
-          field, of_states, units_of_states.data(),
+          field, of_states, units.data(),
           "in the scaling T^2r / r!^2 and divided by R is a variance that the scalar cannot hold",
           "must be positive semidefinite", N * N - 1);
     };

@@ -65,16 +65,9 @@ struct PartDesign {
   // Matrices near I are stored without I: Phi - I keeps all its digits, Phi does not.
 
   /// (I - k C) Phi - I from Phi - I.
-  static Square corrected(Square step, const Array<S, Size>& output,
+  static Square corrected(const Square& step, const Array<S, Size>& output,
                           const ScaledGain<Size, S>& gain) {
-    const auto ahead = output_ahead<Size>(output, step);  // C Phi
-    for (std::size_t i = 0; i < Size; ++i) {
-      for (std::size_t j = 0; j < Size; ++j) {
-        S& x = step(static_cast<int>(i), static_cast<int>(j));
-        x = x - gain[i] * ahead[j];
-      }
-    }
-    return step;
+    return step - column(gain) * column(output_ahead<Size>(output, step)).transpose();
   }
 
   /// (I + A)(I + B) - I.

@@ -233,12 +233,12 @@ class ExtendedStateFilter
     const Covariance of_states = law().covariance();
     // Multiplied in two steps, from both sides: the product of the units may overflow when P does
     // not.
-    const Array<S, N> units = physical_units(this->model());
+    const Estimate units = physical_units(this->model());
     Covariance p;
     for (int i = 0; i < N; ++i) {
       for (int j = 0; j <= i; ++j) {
         const S& scaled = of_states(PlantModel::state_of_row(i), PlantModel::state_of_row(j));
-        p(i, j) = detail::clipped(S(scaled * units[index(i)] * units[index(j)]));
+        p(i, j) = detail::clipped(S(scaled * units(i) * units(j)));
         p(j, i) = p(i, j);
       }
     }
@@ -304,20 +304,15 @@ class ExtendedStateFilter
     return detail::FilterDesign<Law, PlantModel, has_model, Config>::make(config, plant);
   }
 
-  static constexpr std::size_t index(int i) noexcept { return static_cast<std::size_t>(i); }
-
   [[nodiscard]] bool gated() const noexcept { return law().is_watched(); }
   [[nodiscard]] const Law& law() const noexcept { return std::get<0>(this->laws()); }
   [[nodiscard]] Law& law() noexcept { return std::get<0>(this->laws()); }
 
   /// Factors from the states in the scaling of the model to physical units.
-  static Array<S, N> physical_units(const PlantModel& plant) noexcept {
+  static Estimate physical_units(const PlantModel& plant) noexcept {
     typename PlantModel::State ones;
     ones.fill(S(1.0));
-    const Estimate physical = plant.physical(ones);
-    Array<S, N> units;
-    for (int r = 0; r < N; ++r) units[index(r)] = physical(r);
-    return units;
+    return plant.physical(ones);
   }
 
   // A function of its own, so that the step of a frozen filter contains only a tail call.
