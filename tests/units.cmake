@@ -1,7 +1,8 @@
-# Files that are one translation unit and one program with ESOKIT_TESTS_TOGETHER, a program a line. Those
-# that instantiate the same types sit together (chosen by the code that their programs had in common), as
-# many as GCC compiles within some 1.5 GB. Of one line: either law suites, or tests that count allocations
-# (support/no_allocation.hpp, which replaces operator new), or neither. A file in no line is by itself.
+# Files that are one translation unit and one program with ESOKIT_TESTS_TOGETHER: a program a line, called
+# by its first file. Those that instantiate the same types sit together (chosen by the code that their
+# programs had in common), as many as GCC compiles within some 1.5 GB. Of one line: either law suites, or
+# tests that count allocations (support/no_allocation.hpp, which replaces operator new), or neither. A file
+# in no line is by itself.
 set(esokit_units
     "adapter/decorators adapter/outlier_gate"
     "adapter/guarded adapter/guarded_model adapter/measured"
