@@ -24,7 +24,6 @@ set(esokit_units
     "observer/absurd_numbers observer/adjustable_bandwidth_eso observer/given_values observer/reconvergence"
     "observer/algebraic_eso observer/cascade_identities observer/observer_static observer/predictor_corrector observer/random_config observer/refused_config"
     "observer/archetype_scalars observer/concepts_static observer/model_seam"
-    "observer/model_cascade observer/model_eso"
     "observer/named_observer observer/nonlinear_eso observer/pack"
     "observer/adjustable_bandwidth_eso_laws observer/cascade_eso_laws observer/half_gain_eso_laws observer/linear_eso_laws observer/own_observer_laws observer/pole_set_laws"
     "observer/algebraic_eso_laws observer/extended_state_filter_laws observer/model_eso_laws observer/model_parts_laws observer/nonlinear_eso_laws"
