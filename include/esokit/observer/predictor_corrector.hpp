@@ -471,6 +471,8 @@ class PredictorCorrector {
   /// All data members, for derived classes.
   static constexpr int data_members = 5;
 
+  static constexpr bool advances = gain_law_traits<Law>.advances;  ///< `advance` changes the laws
+
   /// True if `step` may be tried.
   [[nodiscard]] ESOKIT_INLINE constexpr bool may_be_quick() const noexcept { return gap_ == 0; }
 
