@@ -153,7 +153,7 @@ start() {
 # instantiate is compiled once.
 units=(
   "core/pack core/scalar core/lanes core/expected core/check core/matrix core/snapshot math/combinatorics math/fal math/positivity analysis/integrator_chain"
-  "gain/continuous_gain gain/feedback_gain gain/riccati observer/named_observer observer/predictor_corrector observer/cascade_identities adapter/outlier_gate"
+  "gain/continuous_gain gain/feedback_gain gain/gain_interval gain/riccati observer/named_observer observer/predictor_corrector observer/cascade_identities adapter/outlier_gate"
   "observer/pack"
   "control/adrc_law control/nonlinear_feedback tune/pid_conversion control/retune control/tracking_differentiator control/smooth_profile"
   "control/experiment"

@@ -163,7 +163,7 @@ int main(int argc, char** argv) {
                        number_or_dash(known, 1e3 * d.output_deviation),
                        number_or_dash(known, d.control_noise / tuning.control_noise),
                        number_or_dash(known, d.settling_time), number_text(d.modulus_margin, 3),
-                       std::to_string(d.instructions), d.constraint});
+                       std::to_string(d.operations), d.constraint});
     }
     report.table("ranking" + std::to_string(c + 1),
                  all[c].name + ": the ranking for the requirement with a control law " +
@@ -171,7 +171,7 @@ int main(int argc, char** argv) {
                      " times as fast as the filter",
                  {"family", "sqrt(J / J*)", "the same without margins", "sd of y (1e-3)",
                   "noise in u / noise allowed", "settling time (s)", "modulus margin",
-                  "instructions per update", "limited by"},
+                  "operations per update", "limited by"},
                  lines);
   }
 

@@ -30,6 +30,7 @@
 #include <esokit/gain/continuous_gain.hpp>
 #include <esokit/gain/switching_certificate.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
+#include <esokit/sim/continuous_certificate.hpp>
 
 #include "common/parallel.hpp"
 #include "common/report.hpp"

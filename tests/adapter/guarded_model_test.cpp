@@ -550,6 +550,30 @@ TEST(GuardedModel, BoundIsOfTheConstantAlone) {
   }
 }
 
+/// What has been put to the bound is there within rounding: `bounded` says so at every sample, and
+/// to put it there once more changes no bit.
+TEST(GuardedModel, AtTheBoundWithinRounding) {
+  for (int trial = 0; trial < 20; ++trial) {
+    const double bound = 1.5 + 0.37 * trial;
+    auto guarded =
+        Guarded<ModelEso<lag>>::make({.observer = lagging(), .disturbance_bound = bound}).value();
+    LagPlant plant{.d = (trial % 2 == 0 ? 4 : -4) * bound};
+    double u = 0;
+    for (int k = 0; k < 400; ++k) {
+      plant.step(u, b0);
+      (void)guarded.update(plant.y, u);
+      u = 15 * std::sin(0.4 * k);
+      if (k < 100) continue;
+      ASSERT_TRUE(guarded.bounded()) << bound << ' ' << k;
+      const auto before = guarded.estimate();
+      ASSERT_EQ(guarded.shift_load(0), StepStatus::ok);
+      for (int i = 0; i < before.size(); ++i) {
+        ASSERT_EQ(guarded.estimate()(i), before(i)) << bound << ' ' << k << ' ' << i;
+      }
+    }
+  }
+}
+
 /// dhat moves only to free the actuator, at its old place whatever the lag does.
 TEST(GuardedModel, PinnedDhatMovesOneWay) {
   for (const double sign : {1.0, -1.0}) {

@@ -481,9 +481,10 @@ class ControllerLawTest : public ::testing::Test {
 
 }  // namespace
 
-void register_controller_laws_of(const std::string& suite, const ControllerType& type) {
+void register_controller_laws_of(const std::string& suite, const ControllerType& type,
+                                 const char* file) {
   for (const Law& law : laws) {
-    ::testing::RegisterTest(suite.c_str(), law.name, type.name.c_str(), nullptr, __FILE__, __LINE__,
+    ::testing::RegisterTest(suite.c_str(), law.name, type.name.c_str(), nullptr, file, __LINE__,
                             [law, type] { return new ControllerLawTest(law, type); });
   }
 }

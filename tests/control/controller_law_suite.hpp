@@ -185,17 +185,19 @@ class ErasedController<Adrc<O, F>> final : public AnyController {
 };
 
 /// Registers all laws for one type, as tests of the suite `suite`.
-void register_controller_laws_of(const std::string& suite, const ControllerType& type);
+void register_controller_laws_of(const std::string& suite, const ControllerType& type,
+                                 const char* file);
 
 /// For each type of the list, as suites NAME/0, NAME/1, ..; with ESOKIT_ONE_TYPE for the first
 /// alone.
 template <class First, class... Rest>
-bool register_controller_laws(const std::string& name, TypeList<First, Rest...>) {
-  register_controller_laws_of(name + "/0", ErasedController<First>::type());
+bool register_controller_laws(const std::string& name, TypeList<First, Rest...>,
+                              const char* file = __builtin_FILE()) {
+  register_controller_laws_of(name + "/0", ErasedController<First>::type(), file);
 #ifndef ESOKIT_ONE_TYPE
   int index = 0;
-  (register_controller_laws_of(name + "/" + std::to_string(++index),
-                               ErasedController<Rest>::type()),
+  (register_controller_laws_of(name + "/" + std::to_string(++index), ErasedController<Rest>::type(),
+                               file),
    ...);
 #endif
   return true;

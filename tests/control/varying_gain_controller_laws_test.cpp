@@ -64,6 +64,7 @@ using VaryingControllers = TypeList<
     Adrc<esokit::AlgebraicEso<2, float>>, Adrc<esokit::AdjustableBandwidthEso<2>, ErrorBased>,
     Adrc<esokit::NonlinearEso<2, double, 1>>, Adrc<esokit::NonlinearEso<1, double, 2>, ErrorBased>,
     Adrc<esokit::ExtendedStateFilter<2>>>;
-const bool registered = register_controller_laws("VaryingGain", VaryingControllers{});
+const bool varying_gain_controller_registered =
+    register_controller_laws("VaryingGain", VaryingControllers{});
 
 }  // namespace esokit_test

@@ -189,7 +189,7 @@ class Filler {
     }
   }
 
-  /// The numbers of an AugmentedModel's or LinearPlantModel's parts.
+  /// The numbers of an AugmentedModel's parts.
   template <class Settings>
   void parts(Settings& model) {
     const auto T = time();

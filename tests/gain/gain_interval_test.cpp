@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <esokit/gain/gain_interval.hpp>
+#include <esokit/sim/continuous_certificate.hpp>
 #include <numbers>
 #include <support/numbers.hpp>
 #include <support/switching.hpp>

@@ -7,6 +7,7 @@
 #include <esokit/gain/continuous_gain.hpp>
 #include <esokit/gain/pole_set.hpp>
 #include <esokit/gain/switching_certificate.hpp>
+#include <esokit/sim/continuous_certificate.hpp>
 #include <numbers>
 #include <support/numbers.hpp>
 #include <support/switching.hpp>

@@ -16,9 +16,9 @@
 
 namespace model_plant_model_test {
 
+using esokit::AugmentedModel;
 using esokit::LinearEso;
 using esokit::LinearPlant;
-using esokit::LinearPlantModel;
 using esokit::ModelParts;
 using esokit::PlantEso;
 using esokit::StepStatus;
@@ -38,7 +38,7 @@ LinearPlant<3> with_zero() {
   return plant;
 }
 
-TEST(LinearPlantModel, AChainEqualsLinearEso) {
+TEST(PlantModel, AChainEqualsLinearEso) {
   auto model = PlantEso<2, ModelParts{.order = 2, .constants = 2}>::make(
                    {.observer_bandwidth = 80.0,
                     .input_gain = 3.0,
@@ -95,14 +95,28 @@ void finds_states_and_disturbance(const LinearPlant<States>& plant) {
   ASSERT_TRUE(run);
 }
 
+// Another plant at the same T: the estimates stay as they are, to the last bit.
+TEST(PlantModel, ARetuneKeepsTheEstimates) {
+  ZeroEso::Config config{
+      .observer_bandwidth = 60.0, .input_gain = 200.0, .sample_time = kT, .model = {with_zero()}};
+  auto eso = ZeroEso::make(config).value();
+  for (int k = 0; k < 100; ++k) {
+    (void)eso.update(std::sin(0.05 * k), std::cos(0.03 * k));
+    const auto before = eso.estimate();
+    config.model.plant.a *= k % 2 == 0 ? 1.25 : 0.8;
+    ASSERT_TRUE(eso.retune(config));
+    ASSERT_EQ(eso.estimate(), before) << k;
+  }
+}
+
 // A disturbance that enters where u does not, and a zero.
-TEST(LinearPlantModel, FindsStatesAndAMismatchedDisturbance) {
+TEST(PlantModel, FindsStatesAndAMismatchedDisturbance) {
   finds_states_and_disturbance(with_zero());
 }
 
 // More states than y, y' and D: the model keeps those of x that the rows of y, y' and D leave open.
 // In each row the first state is the largest, so the open ones show only after an elimination.
-TEST(LinearPlantModel, FindsStatesThatAreNoneOfTheDerivatives) {
+TEST(PlantModel, FindsStatesThatAreNoneOfTheDerivatives) {
   LinearPlant<5> plant{.a = {{-3, 1, 0, 0, 0},
                              {4, -2, 1, 0, 0},
                              {0, 0, -6, 1, 0},
@@ -181,7 +195,7 @@ void equals_the_model_of_parts(const Lag& sensor) {
   EXPECT_EQ(whole->model().measured(rest), 3.0);
 }
 
-TEST(LinearPlantModel, OfAPlantOfPolesIsTheModelOfParts) {
+TEST(PlantModel, OfAPlantOfPolesIsTheModelOfParts) {
   equals_the_model_of_parts<1>(esokit::Lag<1, double>{0.02});
   equals_the_model_of_parts<1>(esokit::Lag<1, double>{0.005});
   equals_the_model_of_parts<2>(esokit::Lag<2, double>{40.0, 0.7});
@@ -190,7 +204,7 @@ TEST(LinearPlantModel, OfAPlantOfPolesIsTheModelOfParts) {
 
 // All parts, mismatched, with a zero and a filtered y: the plant with its disturbance and its
 // sensor as one LinearPlant is what it is compared with.
-TEST(LinearPlantModel, FindsASwingAndAConstantThatEnterElsewhereBehindASensor) {
+TEST(PlantModel, FindsASwingAndAConstantThatEnterElsewhereBehindASensor) {
   const auto plant = with_zero();
   const double w = 40.0;
   const double tau = 0.008;
@@ -236,9 +250,8 @@ TEST(LinearPlantModel, FindsASwingAndAConstantThatEnterElsewhereBehindASensor) {
 }
 
 // A filter takes it, too.
-TEST(LinearPlantModel, AFilterFindsStatesAndDisturbance) {
-  constexpr ModelParts parts{.order = 2, .resonators = 1};
-  using Model = LinearPlantModel<3, parts>;
+TEST(PlantModel, AFilterFindsStatesAndDisturbance) {
+  using Model = AugmentedModel<ModelParts{.order = 2, .states = 3, .resonators = 1}>;
   using Filter =
       esokit::ExtendedStateFilter<2, double, Model::extension, esokit::NoNominalModel, 0, Model>;
   const auto plant = with_zero();
@@ -271,7 +284,7 @@ TEST(LinearPlantModel, AFilterFindsStatesAndDisturbance) {
   EXPECT_NEAR(filter->model().sinusoidal_disturbance(filter->estimate(), 0).amplitude, 3.0, 1e-5);
 }
 
-TEST(LinearPlantModel, AdrcTakesThePlantAsItIs) {
+TEST(PlantModel, AdrcTakesThePlantAsItIs) {
   const auto plant = with_zero();
   using Controller = esokit::Adrc<ZeroEso>;
   auto controller = Controller::make({.observer = {.observer_bandwidth = 60.0,
@@ -288,7 +301,7 @@ TEST(LinearPlantModel, AdrcTakesThePlantAsItIs) {
   EXPECT_LT(*std::max_element(run->output.begin(), run->output.end()), 2.1);
 }
 
-TEST(LinearPlantModel, RestIsWhereThePlantStands) {
+TEST(PlantModel, RestIsWhereThePlantStands) {
   const auto plant = with_zero();
   auto observer = ZeroEso::make({.observer_bandwidth = 60.0,
                                  .input_gain = plant.input_gain(),
@@ -305,8 +318,8 @@ TEST(LinearPlantModel, RestIsWhereThePlantStands) {
   }
 }
 
-TEST(LinearPlantModel, RefusesWhatYDoesNotShow) {
-  using Model = LinearPlantModel<3, ModelParts{.order = 2}>;
+TEST(PlantModel, RefusesWhatYDoesNotShow) {
+  using Model = AugmentedModel<ModelParts{.order = 2, .states = 3}>;
   const auto make = [](const LinearPlant<3>& plant) { return Model::make({plant}, 1.0, kT); };
   auto plant = with_zero();
   EXPECT_TRUE(make(plant));
@@ -323,25 +336,26 @@ TEST(LinearPlantModel, RefusesWhatYDoesNotShow) {
   // d into the first state of a plant that differentiates it: (s (s + 3)) / ..
   LinearPlant<2> hidden{.a = {{-3, 1}, {0, 0}}, .b = {0, 1}, .c = {1, 0}};
   hidden.e = {1.0, 0.0};
-  const auto answer = LinearPlantModel<2, ModelParts{.order = 2}>::make({hidden}, 1.0, kT);
+  const auto answer = AugmentedModel<ModelParts{.order = 2, .states = 2}>::make({hidden}, 1.0, kT);
   EXPECT_EQ(refusal(answer),
             "model.plant.e: hides a constant disturbance behind a zero: the share that "
             "y shows of it is below");
   EXPECT_EQ(answer.error().value, 0.0);
   hidden.e = {1.0, 1e-6};
-  EXPECT_TRUE((LinearPlantModel<2, ModelParts{.order = 2}>::make({hidden}, 1.0, kT)));
-  const auto order = LinearPlantModel<3, ModelParts{.order = 1}>::make({with_zero()}, 1.0, kT);
+  EXPECT_TRUE((AugmentedModel<ModelParts{.order = 2, .states = 2}>::make({hidden}, 1.0, kT)));
+  const auto order =
+      AugmentedModel<ModelParts{.order = 1, .states = 3}>::make({with_zero()}, 1.0, kT);
   EXPECT_EQ(refusal(order), "model.plant: has another relative degree than");
   EXPECT_EQ(order.error().value, 2.0);
 }
 
 // The states beside y and y' are those that these two leave out: here both are of the first two,
 // and of the first most. By the largest element of each row alone the second would be taken.
-TEST(LinearPlantModel, TakesTheStateThatYAndItsDerivativeLeaveOut) {
+TEST(PlantModel, TakesTheStateThatYAndItsDerivativeLeaveOut) {
   LinearPlant<3> plant{
       .a = {{-3, 0, -1}, {1, -1, 1}, {-2, -3, -1}}, .b = {1, 0, 0}, .c = {2, 2, 0}};
   plant.e = plant.b;
-  EXPECT_EQ(refusal(LinearPlantModel<3, ModelParts{.order = 1}>::make({plant}, 2.0, kT)),
+  EXPECT_EQ(refusal(AugmentedModel<ModelParts{.order = 1, .states = 3}>::make({plant}, 2.0, kT)),
             "accepted");
 }
 
@@ -357,8 +371,9 @@ LinearPlant<3> with_notch(double w, double beside) {
   return plant;
 }
 
-TEST(LinearPlantModel, RefusesASwingBehindAZeroAtItsFrequency) {
-  using Model = LinearPlantModel<3, ModelParts{.order = 3, .resonators = 2, .first_order = 1}>;
+TEST(PlantModel, RefusesASwingBehindAZeroAtItsFrequency) {
+  using Model =
+      AugmentedModel<ModelParts{.order = 3, .states = 3, .resonators = 2, .first_order = 1}>;
   const double w = 30.0;
   const auto make = [&](double beside, double frequency, double damping = 0.0,
                         double first_order = 0.123) {
@@ -418,9 +433,9 @@ TEST(LinearPlantModel, RefusesASwingBehindAZeroAtItsFrequency) {
   EXPECT_TRUE(fading(0.26));
 }
 
-TEST(LinearPlantModel, RefusesPartsThatMakeNoSense) {
-  using Model =
-      LinearPlantModel<3, ModelParts{.order = 2, .sensor = 2, .resonators = 2, .first_order = 1}>;
+TEST(PlantModel, RefusesPartsThatMakeNoSense) {
+  using Model = AugmentedModel<ModelParts{
+      .order = 2, .states = 3, .sensor = 2, .resonators = 2, .first_order = 1}>;
   Model::Settings settings{.plant = with_zero(),
                            .sensor = {200.0, 0.7},
                            .resonators = {{{20.0}, {40.0}}},

@@ -17,7 +17,8 @@ verdict in the results (--results, JSON); it then leaves the count. A second cal
 ended. What has no switch is not drawn: a statement of several lines (except for its constants), types,
 `if constexpr`, and what is computed when it is compiled.
 
-Needs a configured build folder (--build, `cmake --preset tests`), in which it builds the tests' libraries.
+Needs a build folder (--build) in which each test is a program of its own, and builds the tests' libraries
+there: `cmake --preset tests -B build/mutants -DESOKIT_TESTS_TOGETHER=OFF`.
 """
 
 import argparse
@@ -498,7 +499,7 @@ def main():
     parser.add_argument("--seconds", type=int, default=600, help="for a compile")
     parser.add_argument("--longest", type=int, default=60, help="seconds of a run; a longer test is left out")
     parser.add_argument("--until", help="HH:MM: begin nothing after it")
-    parser.add_argument("--build", type=Path, default=ROOT / "build/tests")
+    parser.add_argument("--build", type=Path, default=ROOT / "build/mutants")
     parser.add_argument("--results", type=Path, help="default: BUILD/mutants_SEED.json")
     parser.add_argument("--list", action="store_true", help="only show what is drawn, or was found")
     parser.add_argument("--self-test", action="store_true")

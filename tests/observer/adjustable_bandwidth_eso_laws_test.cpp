@@ -41,6 +41,7 @@ struct ObserverTraits<esokit::AdjustableBandwidthEso<Order, S, Extension>>
 using SwitchedTypes =
     TypeList<esokit::AdjustableBandwidthEso<2>, esokit::AdjustableBandwidthEso<1, double, 2>,
              esokit::AdjustableBandwidthEso<2, float>, esokit::AdjustableBandwidthEso<4, float>>;
-const bool registered = register_laws<ObserverLaws>("AdjustableBandwidthEso", SwitchedTypes{});
+const bool adjustable_bandwidth_eso_registered =
+    register_laws<ObserverLaws>("AdjustableBandwidthEso", SwitchedTypes{});
 
 }  // namespace esokit_test

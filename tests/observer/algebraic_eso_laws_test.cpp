@@ -49,6 +49,6 @@ struct ObserverTraits<esokit::AlgebraicEso<Order, S, Extension>>
 using AlgebraicTypes = TypeList<esokit::AlgebraicEso<2>, esokit::AlgebraicEso<1, double, 2>,
                                 esokit::AlgebraicEso<4, double, 3>, esokit::AlgebraicEso<2, float>,
                                 esokit::AlgebraicEso<2, float, 2>>;
-const bool registered = register_laws<ObserverLaws>("AlgebraicEso", AlgebraicTypes{});
+const bool algebraic_eso_registered = register_laws<ObserverLaws>("AlgebraicEso", AlgebraicTypes{});
 
 }  // namespace esokit_test

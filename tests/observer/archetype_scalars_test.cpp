@@ -150,9 +150,9 @@ template <class Observer>
 void expect_that_samples_write_numbers() {
   const auto observer = esokit::detail::blank<Observer>();
   EXPECT_LT(scalars_in(observer), sizeof observer);  // it counts gaps
-  LaneAccess::with_members(observer, [](const auto& kept, const auto&...) {
-    EXPECT_GE(scalars_in(kept), 3 * (Observer::levels * Observer::size + 2));
-    expect_numbers_only(kept);
+  LaneAccess::with_members(observer, [](const auto& numbers, const auto&...) {
+    EXPECT_GE(scalars_in(numbers.kept), 3 * (Observer::levels * Observer::size + 2));
+    expect_numbers_only(numbers.kept);
   });
 }
 

@@ -117,14 +117,15 @@ template <class S>
 using Frozen = esokit::ExtendedStateFilter<2, S, 1>;
 template <class S>
 using Recursive = esokit::ExtendedStateFilter<1, S, 2>;
-inline constexpr esokit::ModelParts swing_parts{.order = 2, .resonators = 1};
+inline constexpr esokit::ModelParts filter_swing{.order = 2, .resonators = 1};
 template <class S>
 using Swing = esokit::ExtendedStateFilter<2, S, 3, esokit::NoNominalModel, 0,
-                                          esokit::AugmentedModel<swing_parts, S>>;
+                                          esokit::AugmentedModel<filter_swing, S>>;
 
 using FilterTypes = TypeList<Frozen<double>, Frozen<float>, Recursive<double>, Recursive<float>,
                              Swing<double>, Swing<float>>;
-const bool registered = register_laws<ObserverLaws>("ExtendedStateFilter", FilterTypes{});
+const bool extended_state_filter_registered =
+    register_laws<ObserverLaws>("ExtendedStateFilter", FilterTypes{});
 
 /// y'' = 3 + 2 sin(w t). All that may be wrong in the end is what rounding of the states, as large
 /// as they are, can do to an estimate.

@@ -48,7 +48,7 @@ using VariantTypes =
     TypeList<esokit::HalfGainEso<2>, esokit::HalfGainEso<3, double, 2>,
              esokit::HalfGainEso<2, float>, esokit::ReducedOrderEso<1>, esokit::ReducedOrderEso<2>,
              esokit::ReducedOrderEso<3, double, 2>, esokit::ReducedOrderEso<2, float>>;
-const bool registered = register_laws<ObserverLaws>("LinearVariants", VariantTypes{});
+const bool half_gain_eso_registered = register_laws<ObserverLaws>("LinearVariants", VariantTypes{});
 
 /// After a correction the first estimate is the measurement.
 TEST(ReducedOrderEso, TakesTheMeasurementAsItIs) {

@@ -8,6 +8,6 @@ using LinearTypes = TypeList<esokit::LinearEso<2>, esokit::LinearEso<1>,
                              esokit::LinearEso<8, double, 4>, esokit::LinearEso<2, long double>,
                              esokit::LinearEso<1, float>, esokit::LinearEso<2, float>,
                              esokit::LinearEso<3, float, 2>, esokit::LinearEso<8, float>>;
-const bool registered = register_laws<ObserverLaws>("LinearEso", LinearTypes{});
+const bool linear_eso_registered = register_laws<ObserverLaws>("LinearEso", LinearTypes{});
 
 }  // namespace esokit_test

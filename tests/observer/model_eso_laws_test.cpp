@@ -28,7 +28,7 @@ struct ObserverTraits<esokit::PlantEso<2, zero_parts, S>> : ModelTraitsOf<WithZe
 
 using ModelTypes = TypeList<WithSwing<double>, WithPoles<double>, WithZero<double>,
                             WithSwing<float>, WithPoles<float>, WithZero<float>>;
-const bool registered = register_laws<ObserverLaws>("ModelEso", ModelTypes{});
+const bool model_eso_registered = register_laws<ObserverLaws>("ModelEso", ModelTypes{});
 
 TEST(ModelEso, RecurringGapsDecayUpToTheLongestThatIsBridged) {
   recurring_gaps_decay(kind_of<esokit::ModelEso<swing_parts>>());

@@ -23,7 +23,7 @@ struct ObserverTraits<esokit::ModelCascadeEso<cascade_parts, 2, S>> : ModelTrait
 };
 
 using PartTypes = TypeList<WithLags<double>, InCascade<double>, WithLags<float>, InCascade<float>>;
-const bool registered = register_laws<ObserverLaws>("ModelParts", PartTypes{});
+const bool model_parts_registered = register_laws<ObserverLaws>("ModelParts", PartTypes{});
 
 TEST(ModelParts, RecurringGapsDecayUpToTheLongestThatIsBridged) {
   recurring_gaps_decay(kind_of<WithLags<double>>());

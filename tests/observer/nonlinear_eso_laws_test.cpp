@@ -51,6 +51,6 @@ struct ObserverTraits<esokit::NonlinearEso<Order, S, Extension>>
 
 using NonlinearTypes = TypeList<esokit::NonlinearEso<2>, esokit::NonlinearEso<1, double, 1>,
                                 esokit::NonlinearEso<2, float>, esokit::NonlinearEso<3, float, 1>>;
-const bool registered = register_laws<ObserverLaws>("NonlinearEso", NonlinearTypes{});
+const bool nonlinear_eso_registered = register_laws<ObserverLaws>("NonlinearEso", NonlinearTypes{});
 
 }  // namespace esokit_test

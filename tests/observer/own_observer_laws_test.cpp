@@ -46,7 +46,8 @@ struct ObserverTraits<OwnEso<S>>
   }
 };
 
-const bool registered = register_laws<ObserverLaws>("OwnEso", TypeList<OwnEso<>, OwnEso<float>>{});
+const bool own_observer_registered =
+    register_laws<ObserverLaws>("OwnEso", TypeList<OwnEso<>, OwnEso<float>>{});
 
 /// In a controller, and in a study of it as it is: run 3 of the study is that of its settings.
 TEST(OwnEso, RunsInAStudy) {

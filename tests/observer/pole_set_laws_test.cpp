@@ -9,6 +9,6 @@ using PoleSetTypes = TypeList<esokit::LinearEso<2, double, 1, esokit::PoleSet>,
                               esokit::LinearEso<4, double, 2, esokit::PoleSet>,
                               esokit::LinearEso<3, float, 1, esokit::PoleSet>,
                               esokit::CascadeEso<2, 2, double, 1, esokit::PoleSet>>;
-const bool registered = register_laws<ObserverLaws>("PoleSet", PoleSetTypes{});
+const bool pole_set_registered = register_laws<ObserverLaws>("PoleSet", PoleSetTypes{});
 
 }  // namespace esokit_test

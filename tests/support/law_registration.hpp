@@ -32,8 +32,10 @@ class LawTest : public ::testing::Test {
   NamedLaw law_;
 };
 
-inline void register_law(const std::string& suite, const std::string& type, const NamedLaw& law) {
-  ::testing::RegisterTest(suite.c_str(), law.name, type.c_str(), nullptr, __FILE__, __LINE__,
+/// `file`: of the test that registers it, by which a program of several files finds its cases.
+inline void register_law(const std::string& suite, const std::string& type, const NamedLaw& law,
+                         const char* file = __builtin_FILE()) {
+  ::testing::RegisterTest(suite.c_str(), law.name, type.c_str(), nullptr, file, __LINE__,
                           [law] { return new LawTest(law); });
 }
 
@@ -44,11 +46,12 @@ struct TypeList {};
 /// for a global: `const bool registered = register_laws<Suite>("Name", TypeList<..>{});`.
 /// With ESOKIT_ONE_TYPE (CMake: ESOKIT_TESTS_SUBSET) for the first type alone.
 template <template <class> class Suite, class First, class... Rest>
-bool register_laws(const std::string& name, TypeList<First, Rest...>) {
+bool register_laws(const std::string& name, TypeList<First, Rest...>,
+                   const char* file = __builtin_FILE()) {
   int index = 0;
   const auto add = [&](const auto& laws, const std::string& type) {
     const std::string suite = name + "/" + std::to_string(index++);
-    for (const NamedLaw& law : laws) register_law(suite, type, law);
+    for (const NamedLaw& law : laws) register_law(suite, type, law, file);
   };
   add(Suite<First>::laws(), ::testing::internal::GetTypeName<First>());
 #ifndef ESOKIT_ONE_TYPE

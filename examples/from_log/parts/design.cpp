@@ -486,7 +486,7 @@ std::vector<CsvRow> ranking(const esokit::Tuning& tuning,
   std::vector<CsvRow> rows{{"", "tuned numbers", "times the best", "the same without margins",
                             "standard deviation of y", "noise in u, % of its range",
                             "y after a load of 10 %", "settling time of a small step (s)",
-                            "modulus margin", "delay margin (ms)", "instructions", "limited by"}};
+                            "modulus margin", "delay margin (ms)", "operations", "limited by"}};
   // Zero where a design was not played.
   const auto played = [](double value) { return value > 0.0 ? number_text(value, 3) : "-"; };
   const auto row = [&](const std::string& before, const esokit::TunedDesign& d) {
@@ -499,7 +499,7 @@ std::vector<CsvRow> ranking(const esokit::Tuning& tuning,
                     number_text(100 * d.control_noise / range, 3),
                     played(0.1 * range * d.load_peak), played(d.settling_time),
                     number_text(d.modulus_margin, 2), number_text(1e3 * d.delay_margin, 3),
-                    d.instructions > 0 ? std::to_string(d.instructions) : "-", d.constraint});
+                    d.operations > 0 ? std::to_string(d.operations) : "-", d.constraint});
   };
   for (std::size_t i = 0; i < tuning.designs.size(); ++i)
     row(std::to_string(i + 1) + " ", tuning.designs[i]);
@@ -513,12 +513,13 @@ void Design::show_on(Page& page, const Findings& findings) const {
   if (tuning_) {
     page.heading("Which observer");
     page.figure(tradeoff_figure(*tuning_, taken_));
-    page.table("observers",
-               "The observer families, each tuned for this requirement, ranked by the deviations "
-               "of y and u together, compared with the best linear controller (sqrt(J / J*); "
-               "within 1 % the cheaper one comes first). The instructions are those of an update "
-               "on a Cortex-M4F in float. --rank takes another row",
-               ranking(*tuning_, rivals_));
+    page.table(
+        "observers",
+        "The observer families, each tuned for this requirement, ranked by the deviations "
+        "of y and u together, compared with the best linear controller (sqrt(J / J*); "
+        "within 1 % the cheaper one comes first). The operations (sums, products, comparisons) "
+        "are those of an update of the observer. --rank takes another row",
+        ranking(*tuning_, rivals_));
     if (!rivals_.empty()) {
       page.text(
           "Rivals are PIDs, each at its own optimum of the same J, under the same margins, "

@@ -40,10 +40,10 @@ class DelayedInput : public NamedAdapter<DelayedInput<Observer, Capacity>, Obser
   using Status = StatusOf<S>;
 
  public:
-  /// The same with another scalar.
+  /// The same with another scalar. Not one that records, as the place in the line changes.
   template <class T>
-  requires(Capacity <=
-           65535) using with_scalar = DelayedInput<detail::WithScalar<Observer, T>, Capacity>;
+  requires(Capacity <= 65535 &&
+           !records<T>) using with_scalar = DelayedInput<detail::WithScalar<Observer, T>, Capacity>;
 
   /// What the adapter can do beyond LoopObserver.
   static constexpr ObserverTraits traits = [] {

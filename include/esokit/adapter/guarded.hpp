@@ -115,7 +115,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   static_assert(on_chain || !varies_time,
                 "esokit: with a model Guarded needs a fixed sample time: not with "
                 "VariableTime");
-  static_assert(!Guards::turns_move_constant(),
+  static_assert(!Guards::turns_move_constant,
                 "esokit: with the poles of a plant a whole turn is a step of the constant: Guarded "
                 "takes WrappedOutput without plant_poles");
 
@@ -170,9 +170,9 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
 
   /// Time update only, see PredictorCorrector::predict.
   StepStatus predict(S u_applied) noexcept {
-    if (gates && weights_.held) [[unlikely]]
-      return predict_standing(u_applied);
-    const StepStatus status = observer_.predict(S(u_applied * told_ratio_));
+    const S told = u_applied * told_ratio_;
+    const StepStatus status =
+        gates && weights_.held ? predict_standing(told) : observer_.predict(told);
     if (takes_measured) keep_bound();
     take_gain();
     return status;
@@ -397,15 +397,13 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   }
 
   /// Prediction while held: d and the actuator continue, and the sensor follows a constant y.
-  ESOKIT_COLD StepStatus predict_standing(S u_applied) noexcept {
+  ESOKIT_COLD StepStatus predict_standing(S told) noexcept {
     const auto before = detail::GuardAccess::states(observer_);
-    const StepStatus status = observer_.predict(S(u_applied * told_ratio_));
+    const StepStatus status = observer_.predict(told);
     if (!has(status, StepStatus::prediction_dropped)) {
       if (set_.guarded.stand_still(observer_, before)) weights_.unsettled = true;
       set_weights();
     }
-    if (takes_measured) keep_bound();
-    take_gain();
     return status;
   }
 

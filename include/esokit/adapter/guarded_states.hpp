@@ -34,18 +34,18 @@ struct GuardAccess {
   /// The scaled states of the observer, level by level.
   template <class O>
   static constexpr auto& states(O& o) noexcept {
-    return innermost(o).kept_.states;
+    return innermost(o).numbers_.kept.states;
   }
   /// The share of the innovation by which the next correction moves the measured value.
   template <class O>
   static constexpr auto measured_gain(const O& o) noexcept {
     const auto& inner = innermost(o);
-    return std::get<0>(inner.law_gain(inner.laws_[0], {}, inner.elapsed()));
+    return std::get<0>(inner.numbers_.law_gain(inner.numbers_.laws[0], {}, inner.elapsed()));
   }
   /// True if all estimates that belong to these states are finite.
   template <class O, class States>
   static constexpr bool finite(const O& o, const States& states) noexcept {
-    return is_finite(innermost(o).probe(states));
+    return is_finite(innermost(o).numbers_.probe(states));
   }
 };
 
@@ -60,13 +60,9 @@ struct GuardedStates {
   static constexpr int levels = Observer::levels;
   static constexpr bool on_chain = model_traits<Model>.is_chain;
 
-  static constexpr bool turns_move_constant() noexcept {
-    if constexpr (requires { Model::parts.plant_poles; }) {
-      return Model::parts.plant_poles && observer_traits<Observer>.wraps_output;
-    } else {
-      return false;
-    }
-  }
+  static constexpr bool turns_move_constant = observer_traits<Observer>.wraps_output && requires {
+    requires Model::parts.plant_poles;
+  };
 
   explicit constexpr GuardedStates(const Model& model) noexcept : constant(model) {}
 
@@ -240,7 +236,7 @@ struct GuardedStates {
     return with_level(observer, level, [&](const auto&, const auto& corrected) -> Proven {
       bool certified;
       if constexpr (on_chain) {
-        certified = gating_certified<size, S>(corrected.gain, leak);
+        certified = gating_certified<size, S>(detail::elements(corrected.gain), leak);
       } else {
         certified = gating_certified(corrected, leak);
       }

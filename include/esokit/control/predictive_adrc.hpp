@@ -102,7 +102,7 @@ class PredictiveAdrc {
     const auto hold = hold_samples(config.start_hold, observer->sample_time());
     if (!hold) return hold.error();
     PredictiveAdrc controller(*observer, *law, *limiter, *hold);
-    for (const S& weight : controller.weights_) {
+    for (const S& weight : controller.set_.weights) {
       if (!all(is_finite(weight))) {
         return Error<S>{"observer.sample_time", observer->sample_time(),
                         "with these gains gives a law that the scalar cannot hold"};
@@ -118,9 +118,9 @@ class PredictiveAdrc {
     S raw = wanted(y);
     if constexpr (observer_traits<Observer>.gates_outliers) {
       if (!observer_.accepts(y)) [[unlikely]]
-        raw = blind_;
+        raw = next_.blind;
     }
-    output_ = limiter_.clamp(select(usable(y, raw), raw, blind_));
+    output_ = limiter_.clamp(select(usable(y, raw), raw, next_.blind));
     phase_ = Phase::measured;
     return output_;
   }
@@ -136,7 +136,7 @@ class PredictiveAdrc {
 
   /// First phase of a sample without a measurement.
   S control_without_measurement() noexcept {
-    output_ = limiter_.clamp(blind_);
+    output_ = limiter_.clamp(next_.blind);
     phase_ = Phase::missing;
     return output_;
   }
@@ -203,7 +203,7 @@ class PredictiveAdrc {
   StepStatus reset(S y) noexcept {
     const StepStatus status = observer_.reset(y);
     if (status != StepStatus::ok) return status;
-    hold_left_ = hold_;
+    hold_left_ = set_.hold;
     phase_ = Phase::prepared;
     arm();
     return status;
@@ -217,11 +217,7 @@ class PredictiveAdrc {
   /// run in an interrupt.
   Check<S> adopt(const PredictiveAdrc& fresh) {
     if (auto ok = observer_.adopt(fresh.observer_); !ok) return ok;
-    weights_ = fresh.weights_;
-    feeds_ = fresh.feeds_;
-    rate_ = fresh.rate_;
-    law_ = fresh.law_;
-    hold_ = fresh.hold_;
+    set_ = fresh.set_;
     limiter_ = fresh.limiter_;
     limiter_.track(output_);
     arm();
@@ -237,16 +233,16 @@ class PredictiveAdrc {
   /// Status of the observer at the last sample.
   [[nodiscard]] StepStatus status() const noexcept { return status_; }
   /// The next u if its measurement is missing, before the limits.
-  [[nodiscard]] const S& blind_output() const noexcept { return blind_; }
+  [[nodiscard]] const S& blind_output() const noexcept { return next_.blind; }
   /// k_0 .. k_(n-1).
-  [[nodiscard]] const Array<S, order>& gains() const noexcept { return law_.gains(); }
+  [[nodiscard]] const Array<S, order>& gains() const noexcept { return set_.law.gains(); }
 
  private:
   using Weights = Array<S, order + 1>;
   using Phase = detail::PredictivePhase;
   friend struct detail::LaneAccess;
   friend struct detail::RecordAccess;
-  static constexpr int data_members = 21;
+  static constexpr int data_members = 10;
 
   /// What is known about the gain before the measurement.
   static constexpr GainKind kind = observer_traits<Observer>.gain_kind;
@@ -263,19 +259,18 @@ class PredictiveAdrc {
       : limiter_(limiter),
         output_(limiter.last()),
         observer_(observer),
-        law_(law),
-        rate_(S(1.0) / observer.sample_time()),
-        hold_left_(hold),
-        hold_(hold) {
+        set_{.law = law, .hold = hold},
+        hold_left_(hold) {
     // The weights include 1/b0 and the scaling T^i / i! of the chain.
     const S inverse = S(1.0) / law.input_gain();
+    const S rate = S(1.0) / observer.sample_time();
     S unit = inverse;
     for (int i = 0; i <= order; ++i) {
       const auto row = static_cast<std::size_t>(i);
-      if (i > 0) unit = unit * (detail::integer<S>(i) * rate_);
+      if (i > 0) unit = unit * (detail::integer<S>(i) * rate);
       const S gain = i < order ? law.gains()[static_cast<std::size_t>(i % order)] : S(1.0);
-      weights_[row] = i < order ? S(gain * unit) : unit;
-      feeds_[row] = i < order ? S(gain * inverse) : inverse;
+      set_.weights[row] = i < order ? S(gain * unit) : unit;
+      set_.feeds[row] = i < order ? S(gain * inverse) : inverse;
       reference_[row] = S(0.0);
     }
   }
@@ -294,46 +289,47 @@ class PredictiveAdrc {
   /// u before the limits.
   [[nodiscard]] ESOKIT_INLINE S wanted(const S& y) const noexcept {
     if constexpr (preset) {
-      return offset_ - slope_ * y;
+      return next_.offset - next_.slope * y;
     } else {
-      const S e = y - offset_;
-      if (general_) [[unlikely]]
+      const S e = y - next_.offset;
+      if (next_.general) [[unlikely]]
         return wanted_in_general(y);
       if constexpr (switched) {
-        return blind_ - select(observer_.gain_law().shrinks(e), slope_, other_slope_) * e;
+        return next_.blind -
+               select(observer_.gain_law().shrinks(e), next_.slope, next_.other_slope) * e;
       } else if constexpr (factored) {
-        return blind_ - (slope_ * observer_.gain_law().factor(e)) * e;
+        return next_.blind - (next_.slope * observer_.gain_law().factor(e)) * e;
       } else {
         if (!all(is_finite(e))) [[unlikely]]
           return e;  // such a law never sees one
-        return blind_ - weigh(observer_.correction_gain(e)) * e;
+        return next_.blind - weigh(observer_.correction_gain(e)) * e;
       }
     }
   }
 
   /// True if the observer will accept y, that is, if no estimate would become infinite.
   [[nodiscard]] ESOKIT_INLINE auto usable(const S& y, const S& raw) const noexcept {
-    return is_finite(preset ? S(guard_ * y) : raw);
+    return is_finite(preset ? S(next_.guard * y) : raw);
   }
 
   /// For samples after a gap, or if u does not depend on y.
   [[nodiscard]] ESOKIT_COLD S wanted_in_general(const S& y) const noexcept {
-    if (settled_) return blind_;
-    if (observer_.restarts()) return feed_ - weights_[0] * y;
-    const S e = y - offset_;
+    if (next_.settled) return next_.blind;
+    if (observer_.restarts()) return next_.feed - set_.weights[0] * y;
+    const S e = y - next_.offset;
     if (!all(is_finite(e))) return e;
-    return blind_ - weigh(observer_.correction_gain(e)) * e;
+    return next_.blind - weigh(observer_.correction_gain(e)) * e;
   }
 
   /// sum_i w_i x_i over the plant states and the disturbance.
   template <class State>
   [[nodiscard]] ESOKIT_INLINE S weigh(const State& x) const noexcept {
-    return detail::weighed<0, order + 1>(weights_, x);
+    return detail::weighed<0, order + 1>(set_.weights, x);
   }
 
   /// Computes all parts of the next u that do not need the measurement.
   void arm() noexcept {
-    settled_ = false;
+    next_.settled = false;
     look_ahead();
     if constexpr (preset) {
       if (Observer::levels > 1 || !measures_first_row || observer_.restarts()) {
@@ -342,13 +338,13 @@ class PredictiveAdrc {
         arm_by(observer_.correction_gain(S(0.0)));
       }
     } else {
-      offset_ = observer_.template scaled_estimate<0>();
-      general_ = observer_.missed() > 1;
+      next_.offset = observer_.template scaled_estimate<0>();
+      next_.general = observer_.missed() > 1;
       if constexpr (switched) {
-        slope_ = weigh(observer_.gain_law().shrinking_gain());
-        other_slope_ = weigh(observer_.gain_law().otherwise_gain());
+        next_.slope = weigh(observer_.gain_law().shrinking_gain());
+        next_.other_slope = weigh(observer_.gain_law().otherwise_gain());
       } else if constexpr (factored) {
-        slope_ = weigh(observer_.gain_law().linear_gain());
+        next_.slope = weigh(observer_.gain_law().linear_gain());
       }
     }
     if constexpr (observer_traits<Observer>.blanks_estimate) {
@@ -356,81 +352,87 @@ class PredictiveAdrc {
         // A blanked observer publishes the estimate from its start, so u does not depend on y.
         typename Reference::All reference;
         for (int i = 0; i <= order; ++i) reference(i) = reference_[static_cast<std::size_t>(i)];
-        settle_for(law_.control(observer_.estimate(), reference));
+        settle_for(set_.law.control(observer_.estimate(), reference));
       }
     }
     if (hold_left_ > 0) [[unlikely]]
       settle_for(S(0.0));
     // If this is not finite, u would be NaN with a measurement, and a NaN passes the limits.
-    if (!all(is_finite(blind_)) || !all(is_finite(offset_)) || !all(is_finite(slope_)))
-        [[unlikely]] {
+    if (!all(is_finite(next_.blind)) || !all(is_finite(next_.offset)) ||
+        !all(is_finite(next_.slope))) [[unlikely]] {
       settle_for_blind();
     }
   }
 
   /// u without a measurement.
   void look_ahead() noexcept {
-    feed_ = detail::weighed<0, order + 1>(feeds_, reference_);
-    const S tail = detail::weighed_estimates<1, order>(weights_, observer_);
-    const S ahead = detail::weighed<1, order>(feeds_, reference_);
-    blind_ =
-        weights_[0] * (reference_[0] - observer_.template scaled_estimate<0>()) + (ahead - tail);
+    next_.feed = detail::weighed<0, order + 1>(set_.feeds, reference_);
+    const S tail = detail::weighed_estimates<1, order>(set_.weights, observer_);
+    const S ahead = detail::weighed<1, order>(set_.feeds, reference_);
+    next_.blind = set_.weights[0] * (reference_[0] - observer_.template scaled_estimate<0>()) +
+                  (ahead - tail);
   }
 
   /// For the gain of the next correction.
   void arm_by(const ScaledGain<Observer::size, S>& gain) noexcept {
-    slope_ = weigh(gain);
-    offset_ = blind_ + slope_ * observer_.template scaled_estimate<0>();
-    guard_ = observer_.finite_probe(gain);
+    next_.slope = weigh(gain);
+    next_.offset = next_.blind + next_.slope * observer_.template scaled_estimate<0>();
+    next_.guard = observer_.finite_probe(gain);
   }
 
   /// For cascades, and if the observer will restart.
   template <class Preview>
   requires requires(const Preview& next) { next.slope; }
   void arm_by(const Preview& next) noexcept {
-    slope_ = weigh(next.slope);
-    offset_ = feed_ - weigh(next.offset);
-    guard_ = observer_.finite_probe(next.slope);
+    next_.slope = weigh(next.slope);
+    next_.offset = next_.feed - weigh(next.offset);
+    next_.guard = observer_.finite_probe(next.slope);
   }
 
   void settle_for_blind() noexcept {
-    settle_for(select(is_finite(blind_), blind_, limiter_.last()));
+    settle_for(select(is_finite(next_.blind), next_.blind, limiter_.last()));
   }
 
   /// The next u does not depend on y.
   void settle_for(const S& u) noexcept {
-    blind_ = u;
-    settled_ = true;
-    general_ = true;
+    next_.blind = u;
+    next_.settled = true;
+    next_.general = true;
     if constexpr (preset) {
-      offset_ = u;
-      slope_ = S(0.0);
+      next_.offset = u;
+      next_.slope = S(0.0);
     }
   }
 
-  // Members that `control` uses come first.
-  S offset_{};  ///< ubar_k; if the gain depends on e, the predicted y
-  S slope_{};   ///< minus du/dy
-  S guard_{};   ///< largest factor, with units, by which y enters the estimates
-  S other_slope_{};
-  S blind_{};  ///< u without a measurement
+  // What `control` uses comes first.
+
+  /// The next u, see `arm`.
+  struct Next {
+    S offset{};  ///< ubar_k; if the gain depends on e, the predicted y
+    S slope{};   ///< minus du/dy
+    S guard{};   ///< largest factor, with units, by which y enters the estimates
+    S other_slope{};
+    S blind{};  ///< u without a measurement
+    S feed{};
+    bool general = false;  ///< the gain depends on e: no short way
+    bool settled = false;  ///< u is `blind` for any y
+  } next_;
   Limiter<S> limiter_;
   S measurement_{};
   S output_{};
-  bool general_ = false;  ///< the gain depends on e: no short way
-  bool settled_ = false;  ///< u is blind_ for any y
   Phase phase_ = Phase::prepared;
 
   Observer observer_;
-  AdrcLaw<order, S> law_;
-  Weights weights_{};    ///< weights of the scaled states
-  Weights feeds_{};      ///< weights of the reference and its derivatives
+  /// What a retune replaces.
+  struct Set {
+    AdrcLaw<order, S> law;
+    Weights weights{};  ///< of the scaled states
+    Weights feeds{};    ///< of the reference and its derivatives
+    std::uint32_t hold{};
+  } set_;
   Weights reference_{};  ///< (r, r', .., r^(n)) of the next sample
-  S feed_{};
-  S rate_;  ///< 1/T
   StepStatus status_ = StepStatus::ok;
   std::uint32_t hold_left_;
-  std::uint32_t hold_;
 };
 
 /// Distinguishes the type in snapshots.

@@ -45,24 +45,21 @@ template <int Size, auto steps, Scalar S>
 constexpr int longest_step(const S& decay) noexcept {
   constexpr BridgedSteps known = steps(Size);
   constexpr double above_rounding = 1.0001;
-  if constexpr (known.reach < 0) {
-    return most_bridged;
-  } else {
-    constexpr double least = constexpr_decay(known.reach * above_rounding);
-    Array<S, 16> powers{};  // of exponents 1, 2, 4, ..
-    powers[0] = decay;
-    for (std::size_t i = 1; i < powers.size(); ++i) powers[i] = powers[i - 1] * powers[i - 1];
-    S left(1.0);
-    int longest = 0;
-    for (std::size_t i = powers.size(); i-- > 0;) {
-      const S next = left * powers[i];
-      if (next >= constant<S>(least)) {
-        left = next;
-        longest += 1 << i;
-      }
+  constexpr double least = constexpr_decay(known.reach * above_rounding);
+  if (known.reach < 0) return most_bridged;
+  Array<S, 16> powers{};  // of exponents 1, 2, 4, ..
+  powers[0] = decay;
+  for (std::size_t i = 1; i < powers.size(); ++i) powers[i] = powers[i - 1] * powers[i - 1];
+  S left(1.0);
+  int longest = 0;
+  for (std::size_t i = powers.size(); i-- > 0;) {
+    const S next = left * powers[i];
+    if (next >= constant<S>(least)) {
+      left = next;
+      longest += 1 << i;
     }
-    return longest < known.ratio ? known.ratio : longest < most_bridged ? longest : most_bridged;
   }
+  return longest < known.ratio ? known.ratio : longest < most_bridged ? longest : most_bridged;
 }
 
 /// For many states one P is used that has a closed form, the integral of e^-s times the square of

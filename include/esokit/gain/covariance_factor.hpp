@@ -45,9 +45,6 @@ struct MatrixTransition {
   Matrix<S, Size, Size> phi;   ///< N x N, scaled
   Array<int, Size> degrees{};  ///< power of T in the scaling of each state
 
-  template <class T>
-  using with_scalar = MatrixTransition<Size, T>;  ///< the same with another scalar
-
   /// Phi of a model.
   template <class Model>
   static MatrixTransition of(const Model& model) noexcept {
@@ -412,12 +409,8 @@ class CovarianceFactor {
   }
 
   static constexpr S inverse_of(const S& variance) noexcept {
-    if constexpr (PlainScalar<S>) {
-      return variance > S(0.0) ? S(1.0) / variance : S(0.0);
-    } else {
-      const auto some = variance > S(0.0);
-      return select(some, S(S(1.0) / select(some, variance, S(1.0))), S(0.0));
-    }
+    const auto some = variance > S(0.0);
+    return select(some, S(S(1.0) / select(some, variance, S(1.0))), S(0.0));
   }
 
   Array<S, Size> variances_;

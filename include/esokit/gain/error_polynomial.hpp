@@ -38,23 +38,9 @@ constexpr Array<Array<T, Size + 1>, Size> eulerian_table() noexcept {
 
 }  // namespace detail
 
-/// s^N + l_1 s^(N-1) + .. + l_N with s in units of `unit` (1/s), so that the q_i are near one.
-/// @param gain N x 1, row i in 1/s^(i+1)
-template <int Size, Scalar S>
-ErrorPolynomial<Size, S> error_polynomial(const Vector<S, Size>& gain, const S& unit) {
-  ErrorPolynomial<Size, S> q{};
-  q[Size] = S(1.0);
-  const S inverse = S(1.0) / unit;
-  for (int i = 1; i <= Size; ++i) {
-    S value = gain(i - 1);
-    for (int j = 0; j < i; ++j) value = value * inverse;
-    q[static_cast<std::size_t>(Size - i)] = value;
-  }
-  return q;
-}
-
-/// The same for a sampled observer, by the bilinear map z = (1 + s h/2) / (1 - s h/2) with h =
-/// `unit`: a positive multiple of the characteristic polynomial in z.
+/// The error of a sampled observer, by the bilinear map z = (1 + s h/2) / (1 - s h/2) with h =
+/// `unit`: a positive multiple of the characteristic polynomial in z. That of a continuous observer
+/// is in sim/continuous_certificate.hpp.
 ///
 /// q(s) = s^N + sum_r k_r h^-(r+1) G_r(h s/2) s^(N-1-r). The map takes the unit circle to the
 /// imaginary axis, and keeps common Lyapunov matrices and differences of rank one.
@@ -78,15 +64,8 @@ ErrorPolynomial<Size, S> error_polynomial(const ScaledGain<Size, S>& gain, const
   return q;
 }
 
-/// A frequency scale of a gain set, 1/s: the harmonic mean of its poles; equal to their magnitude
-/// if all are equal.
-template <int Size, Scalar S>
-S frequency_scale(const Vector<S, Size>& gain) {
-  static_assert(Size >= 2);
-  return S(static_cast<double>(Size)) * gain(Size - 1) / gain(Size - 2);
-}
-
-/// The same for a scaled gain, in units of 1/T: about omega T, and at most 2 for equal poles.
+/// A frequency scale of a scaled gain, in units of 1/T: the harmonic mean of its poles, about omega
+/// T, and at most 2 for equal poles.
 template <int Size, Scalar S>
 S frequency_scale(const ScaledGain<Size, S>& gain) {
   static_assert(Size >= 2);

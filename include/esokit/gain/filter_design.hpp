@@ -9,7 +9,7 @@
 namespace esokit::detail {
 
 /// @tparam Law a RiccatiGain @tparam has_model the disturbance has a nominal model
-template <class Law, class PlantModel, bool has_model>
+template <class Law, class PlantModel, bool has_model, class Config>
 class FilterDesign {
   using S = typename Law::scalar_type;
   static constexpr int Order = PlantModel::order;
@@ -18,10 +18,13 @@ class FilterDesign {
 
  public:
   /// The law, or an error. Sample time and input gain of the config are already checked.
-  template <class Config>
   static Expected<Law, Error<S>> make(const Config& config, const PlantModel& plant) {
     Rules<S> rules;
-    rules.all_of(check_rule(config)).not_negative("outlier_threshold", config.outlier_threshold);
+    rules.all_of(check_inflation<S>(config));
+    if (config.inflation_rule == InflationRule::adaptive) {
+      rules.positive("trace_weights", config.trace_weights);
+    }
+    rules.not_negative("outlier_threshold", config.outlier_threshold);
     if (!rules) return rules.error();
     auto settings = law_settings(config, plant);
     if (!settings) return settings.error();
@@ -45,28 +48,12 @@ class FilterDesign {
  private:
   static constexpr std::size_t index(int i) noexcept { return static_cast<std::size_t>(i); }
 
-  template <class Config>
-  static Check<S> check_rule(const Config& config) {
-    Rules<S> rules;
-    rules.all_of(check_inflation<S>(config));
-    if (config.inflation_rule == InflationRule::adaptive) {
-      rules.positive("trace_weights", config.trace_weights);
-    }
-    return rules;
-  }
-
-  /// Factors from the rows of the estimate to the states of the law (T^r / r! for the chain),
+  /// For each state of the law the factor from its row of the estimate (T^r / r! for the chain),
   /// divided by `root`, the root of the unit of variances.
   static Array<S, N> scaled_units(const PlantModel& plant, const S& root) {
-    typename PlantModel::Estimate ones;
-    for (int r = 0; r < N; ++r) ones(r) = S(1.0) / root;
-    const auto states = plant.scaled(ones);
-    Array<S, N> units;
-    for (int r = 0; r < N; ++r) units[index(r)] = states[index(PlantModel::state_of_row(r))];
-    return units;
+    return plant.scaled(PlantModel::Estimate::Constant(S(1.0) / root));
   }
 
-  template <class Config>
   static Expected<RiccatiSettings<N, S>, Error<S>> law_settings(const Config& config,
                                                                 const PlantModel& plant) {
     using std::sqrt;
@@ -95,7 +82,8 @@ class FilterDesign {
       driven = driven || all(q(i, i) > S(0.0));
       if (all(r > S(0.0))) continue;
       for (const S& variance : {q(i, i), config.initial_covariance(i, i)}) {
-        const S seen = (variance * plain[index(i)]) * plain[index(i)];
+        const S& factor = plain[index(PlantModel::state_of_row(i))];
+        const S seen = (variance * factor) * factor;
         unit = select(unit < seen, seen, unit);
       }
     }
@@ -110,15 +98,13 @@ class FilterDesign {
     const auto in_law = [&units](const char* field, const Covariance& p) {
       // The config is in rows of the estimate, the law in states of the model.
       Covariance of_states;
-      Array<S, N> units_of_states;
       for (int i = 0; i < N; ++i) {
-        units_of_states[index(PlantModel::state_of_row(i))] = units[index(i)];
         for (int j = 0; j < N; ++j) {
           of_states(PlantModel::state_of_row(i), PlantModel::state_of_row(j)) = p(i, j);
         }
       }
       return factored<N, S>(
-          field, of_states, units_of_states.data(),
+          field, of_states, units.data(),
           "in the scaling T^2r / r!^2 and divided by R is a variance that the scalar cannot hold",
           "must be positive semidefinite", N * N - 1);
     };
@@ -136,14 +122,12 @@ class FilterDesign {
                                  .trace_weights = config.trace_weights};
   }
 
-  template <class Config>
   static int place_of_highest(const Config& config) noexcept {
     return config.process_covariance ? N * N - 1 : N - 1;
   }
 
   /// A state that is known exactly is never corrected, and one that is never disturbed is corrected
   /// less and less.
-  template <class Config>
   static Check<S> check_way_back(const Config& config, const Covariance& q) {
     const S& highest = q(N - 1, N - 1);
     // In a composed model it depends on the parts which state is the highest; a known actuator need
@@ -166,7 +150,6 @@ class FilterDesign {
     return {};
   }
 
-  template <class Config>
   static Check<S> check_alternating(const Config& config, const CovarianceFactor<N, S>& noise,
                                     const S& unit, const PlantModel& plant) {
     if (config.inflation_rule == InflationRule::adaptive || all(config.inflation >= S(0.01))) {
@@ -178,7 +161,6 @@ class FilterDesign {
     return alternating("measurement_variance", r, -1, S(least * unit));
   }
 
-  template <class Config>
   static Check<S> freeze(Law& law, const Config& config) {
     const char* field = noise_field(config);
     const S highest = config.process_covariance ? (*config.process_covariance)(N - 1, N - 1)

@@ -73,42 +73,20 @@ constexpr S least_certified_gain(const EqualSampledPoles<Size, S>& poles) noexce
   return detail::least_factor<Size + 1>(detail::centre_power(poles));
 }
 
-/// The same for the continuous observer.
-template <int Size>
-constexpr double least_certified_gain() noexcept {
-  return detail::least_factor<Size + 1>(1.0);
-}
-
-/// (N-1) / (2N): with a k_min of at least this, every k_max is certified for the continuous
-/// observer.
-template <int Size>
-constexpr double unbounded_certified_gain() noexcept {
-  return (Size - 1.0) / (2.0 * Size);
-}
-
 /// k times a gain set.
-template <int Size, Scalar S>
-constexpr ScaledGain<Size, S> multiplied(const ScaledGain<Size, S>& gain, const S& k) noexcept {
-  ScaledGain<Size, S> result = gain;
-  for (S& value : result) value = value * k;
-  return result;
+template <int Size, Scalar S, class Gain>
+constexpr Gain multiplied(Gain gain, const S& k) noexcept {
+  for (S& value : gain) value = value * k;
+  return gain;
 }
 
-/// True if the sampled observer is certified stable for any variation of the factor between `low`
-/// and `high`.
-template <int Size, Scalar S>
-[[nodiscard]] bool gain_range_certified(const ScaledGain<Size, S>& gain, const S& low,
-                                        const S& high) {
+/// True if the observer is certified stable for any variation of the factor between `low` and
+/// `high`.
+/// @param gain a ScaledGain, or the gain vector of a continuous observer
+template <int Size, Scalar S, class Gain>
+[[nodiscard]] bool gain_range_certified(const Gain& gain, const S& low, const S& high) {
   return switching_certified<Size, S>(multiplied<Size, S>(gain, low),
                                       multiplied<Size, S>(gain, high));
-}
-
-/// The same for a continuous gain.
-template <int Size, Scalar S>
-[[nodiscard]] bool gain_range_certified(const Vector<S, Size>& gain, const S& low, const S& high) {
-  const Vector<S, Size> first = gain * low;
-  const Vector<S, Size> second = gain * high;
-  return switching_certified<Size, S>(first, second);
 }
 
 /// Largest k_max in (base, ceiling) that is certified together with the limit `low`, by bisection;

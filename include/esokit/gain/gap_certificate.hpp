@@ -51,12 +51,7 @@ class FallingSquare {
   [[nodiscard]] bool falls(const Square& step) const {
     // P - A P A' = -(E P + (E P)' + E P E'), E = A - I.
     const Square half = step * p_;
-    Square rest = half * step.transpose();
-    for (int i = 0; i < Size; ++i) {
-      for (int j = 0; j < Size; ++j) {
-        rest(i, j) = -(rest(i, j) + half(i, j) + half(j, i)) - margin_ * p_(i, j);
-      }
-    }
+    const Square rest = -(half * step.transpose() + half + half.transpose()) - p_ * margin_;
     Matrix<S, Size, 1> none{};
     return solve_positive<Size, 1, S>(rest, none).has_value();
   }
@@ -69,18 +64,6 @@ class FallingSquare {
   S margin_{};
 };
 
-/// k k'.
-template <int Size, Scalar S>
-Matrix<S, Size, Size> squared(const Array<S, Size>& gain) noexcept {
-  Matrix<S, Size, Size> square;
-  for (int i = 0; i < Size; ++i) {
-    for (int j = 0; j < Size; ++j) {
-      square(i, j) = gain[static_cast<std::size_t>(i)] * gain[static_cast<std::size_t>(j)];
-    }
-  }
-  return square;
-}
-
 /// The longest step of the chain, in samples, with the gains of `poles` after gaps: each one up to
 /// 20 samples is tested, then steps that grow by a twentieth.
 /// @param unit a, largest abs(1 - rho_i) @param decay -ln of the largest abs(rho_i)
@@ -88,34 +71,29 @@ template <int Size, PlainScalar S, class Poles>
 int longest_falling_step(const Poles& poles, const S& unit, const S& decay) {
   const auto step = [&](int samples) {
     // Errors in units of 1 / a^r.
-    const auto gain = gap_gain<Size, S>(poles, static_cast<unsigned>(samples));
+    auto k = column(gap_gain<Size, S>(poles, static_cast<unsigned>(samples)));
     const S over = unit * static_cast<S>(samples);
-    std::pair<Matrix<S, Size, Size>, Array<S, Size>> all;
-    Array<S, Size> power{};
+    Vector<S, Size> power;
     S of_over(1), of_unit(1);
-    for (std::size_t i = 0; i < Size; ++i) {
-      power[i] = of_over;
-      all.second[i] = gain[i] / of_unit;
+    for (int i = 0; i < Size; ++i) {
+      power(i) = of_over;
+      k(i) = k(i) / of_unit;
       of_over = of_over * over;
       of_unit = of_unit * unit;
     }
+    auto error = -(k * power.transpose());
     for (int i = 0; i < Size; ++i) {
-      for (int j = 0; j < Size; ++j) {
-        all.first(i, j) =
-            -(all.second[static_cast<std::size_t>(i)] * power[static_cast<std::size_t>(j)]);
-        if (j > i) {
-          all.first(i, j) +=
-              static_cast<S>(binomial(j, i)) * power[static_cast<std::size_t>(j - i)];
-        }
+      for (int j = i + 1; j < Size; ++j) {
+        error(i, j) += static_cast<S>(binomial(j, i)) * power(j - i);
       }
     }
-    return all;
+    return std::pair{error, k};
   };
-  const auto [one, gain] = step(1);
+  const auto [one, k] = step(1);
   int longest = 1;
   // The discount that suits best depends on how far the poles are apart.
   for (const S share : {S(0.5), S(1), S(1.5)}) {
-    const auto square = FallingSquare<Size, S>::make(one, squared<Size, S>(gain), S(share * decay));
+    const auto square = FallingSquare<Size, S>::make(one, k * k.transpose(), S(share * decay));
     if (!square) continue;
     for (int samples = 2; samples <= most_bridged; samples += 1 + samples / 20) {
       if (!square->falls(step(samples).first)) break;

@@ -21,8 +21,10 @@
 #pragma once
 
 #include <cmath>
+#include <esokit/gain/model_placement.hpp>
 #include <esokit/gain/switching_certificate.hpp>
 #include <esokit/math/dense.hpp>
+#include <esokit/model/chain_model.hpp>
 #include <esokit/model/corrected_part.hpp>
 
 namespace esokit {
@@ -46,9 +48,14 @@ ErrorPolynomial<Size, S> leaking_polynomial(const ScaledGain<Size, S>& gain, con
   return p;
 }
 
-/// For q_0 = 0, which makes the product zero at w = 0: tests the rest, divided by w^2.
+/// Re p / q > 0 on the imaginary axis, with p stable. @param leaks false: q_0 = 0, which makes the
+/// product zero at w = 0; the rest, divided by w^2, is tested
 template <int Size, Scalar S>
-bool positive_but_at_standstill(const Array<S, Size + 1>& product) {
+bool certified_against(const ErrorPolynomial<Size, S>& p, const ErrorPolynomial<Size, S>& q,
+                       bool leaks) {
+  if (!is_hurwitz<Size, S>(p) || !(q[1] > S(0.0))) return false;
+  const auto product = half_plane_product<Size, S>(p, q);
+  if (leaks) return positive_on_half_line<Size, S>(product);
   Array<S, Size> rest{};
   for (std::size_t i = 0; i < Size; ++i) rest[i] = product[i + 1];
   return positive_on_half_line<Size - 1, S>(rest);
@@ -67,12 +74,9 @@ template <int Size, Scalar S>
   if (!is_finite(unit) || !(unit > S(0.0))) return false;
   ScaledGain<Size, S> frozen = gain;
   frozen[Size - 1] = S(0.0);
-  const auto p = detail::leaking_polynomial<Size, S>(gain, leak, unit);
-  const auto q = detail::leaking_polynomial<Size, S>(frozen, leak, unit);
-  if (!is_hurwitz<Size, S>(p) || !(q[1] > S(0.0))) return false;
-  const auto product = detail::half_plane_product<Size, S>(p, q);
-  if (leak > S(0.0)) return positive_on_half_line<Size, S>(product);
-  return detail::positive_but_at_standstill<Size, S>(product);
+  return detail::certified_against<Size, S>(detail::leaking_polynomial<Size, S>(gain, leak, unit),
+                                            detail::leaking_polynomial<Size, S>(frozen, leak, unit),
+                                            leak > S(0.0));
 }
 
 namespace detail {
@@ -82,61 +86,46 @@ namespace detail {
 template <int Size, Scalar S>
 struct ConstantLevel {
   Matrix<S, Size, Size> step;  ///< Phi - I
-  Array<S, Size> ahead{};      ///< C Phi
-  Array<S, Size> gain{};       ///< k
-  Array<S, Size> row{};        ///< the constant is `row` x
-  Array<S, Size> column{};     ///< change of x with the constant
+  Vector<S, Size> ahead;       ///< C Phi
+  Vector<S, Size> gain;        ///< k
+  Vector<S, Size> row;         ///< the constant is `row` x
+  Vector<S, Size> column;      ///< change of x with the constant
 
   /// That of a chain with one extended state.
-  explicit ConstantLevel(const ScaledGain<Size, S>& of_chain) : gain(of_chain) {
-    constexpr auto& binomials = binomial_table<Size, TableScalar<S>>;
-    for (std::size_t i = 0; i < Size; ++i) {
-      for (std::size_t j = 0; j < Size; ++j) {
-        step(static_cast<int>(i), static_cast<int>(j)) = j > i ? S(binomials[j][i]) : S(0.0);
-      }
-      ahead[i] = S(1.0);
-      row[i] = column[i] = S(i + 1 == Size ? 1.0 : 0.0);
-    }
-  }
+  explicit ConstantLevel(const ScaledGain<Size, S>& of_chain)
+      : step(ChainModel<Size - 1, S>::increment()),
+        ahead(Vector<S, Size>::Constant(S(1.0))),
+        gain(detail::column(of_chain)),
+        row(Matrix<S, Size, Size>::Identity().col(Size - 1)),
+        column(row) {}
 
   template <int Whole, int Pairs, class Model>
   ConstantLevel(const CorrectedPart<Size, Whole, Pairs, S>& part, const Model& model,
                 const ScaledGain<Whole, S>& of_model)
-      : step(part.step) {
-    const auto constant_row = model.constant_row();
+      : step(part.step),
+        ahead(detail::column(output_ahead<Size>(part.output, part.step))),
+        row((detail::column(model.constant_row()).transpose() * part.whole).transpose()) {
     const auto constant_column = model.constant_column();
-    for (std::size_t j = 0; j < Size; ++j) {
-      const auto state = static_cast<std::size_t>(part.states[j]);
-      gain[j] = of_model[state];
-      column[j] = constant_column[state];
-      ahead[j] = part.output[j];
-      row[j] = S(0.0);
-      for (std::size_t i = 0; i < Size; ++i) {
-        ahead[j] = ahead[j] + part.output[i] * step(static_cast<int>(i), static_cast<int>(j));
-      }
-      for (std::size_t i = 0; i < Whole; ++i) {
-        row[j] = row[j] + constant_row[i] * part.whole(static_cast<int>(i), static_cast<int>(j));
-      }
+    for (int j = 0; j < Size; ++j) {
+      const int state = part.states[static_cast<std::size_t>(j)];
+      gain(j) = of_model[static_cast<std::size_t>(state)];
+      column(j) = constant_column[static_cast<std::size_t>(state)];
     }
   }
 
   /// The correction of the constant by an innovation of one.
-  [[nodiscard]] S correction() const {
-    S found(0.0);
-    for (std::size_t i = 0; i < Size; ++i) found = found + row[i] * gain[i];
-    return found;
-  }
+  [[nodiscard]] S correction() const { return row.dot(gain); }
 
   /// A - I of the error dynamics with correction and leak. @param trust phi @param leak a
   [[nodiscard]] Matrix<S, Size, Size> error(const S& trust, const S& leak) const {
     const S found = correction();
     auto all = step;
-    for (std::size_t i = 0; i < Size; ++i) {
-      const S k = gain[i] - (S(1.0) - trust) * found * column[i];
-      for (std::size_t j = 0; j < Size; ++j) {
-        S& x = all(static_cast<int>(i), static_cast<int>(j));
+    for (int i = 0; i < Size; ++i) {
+      const S k = gain(i) - (S(1.0) - trust) * found * column(i);
+      for (int j = 0; j < Size; ++j) {
         // A prediction does not change the constant: row Phi = row.
-        x = x - k * ahead[j] - leak * column[i] * (row[j] - trust * found * ahead[j]);
+        all(i, j) =
+            all(i, j) - k * ahead(j) - leak * column(i) * (row(j) - trust * found * ahead(j));
       }
     }
     return all;
@@ -145,12 +134,7 @@ struct ConstantLevel {
   /// The steady error of the states under a constant d. @param d scaled @param leak a
   [[nodiscard]] Matrix<S, Size, 1> leak_error(const S& leak, const S& d) const {
     // (I - A) error = leak d.
-    auto kept = -error(S(1.0), leak);
-    Matrix<S, Size, 1> left;
-    const S leaking = leak * d;
-    for (int i = 0; i < Size; ++i) left(i) = leaking * column[static_cast<std::size_t>(i)];
-    solve_in_place(DenseView<S>{kept.data(), Size}, DenseView<S>{left.data(), Size, 1});
-    return left;
+    return solved(-error(S(1.0), leak), column * S(leak * d));
   }
 };
 
@@ -186,19 +170,12 @@ Array<S, Order + 1> leak_error(const std::array<ScaledGain<Order + 1, S>, Levels
 template <int Size, Scalar S>
 ErrorPolynomial<Size, S> bilinear_polynomial(const Matrix<S, Size, Size>& difference,
                                              const S& unit) {
-  auto mapped = difference;
-  auto half = Matrix<S, Size, Size>::Identity() + difference * S(0.5);
-  solve_in_place(DenseView<S>{half.data(), Size}, DenseView<S>{mapped.data(), Size, Size});
-  mapped = mapped / unit;
+  const auto half = Matrix<S, Size, Size>::Identity() + difference * S(0.5);
+  const auto lower = characteristic(Matrix<S, Size, Size>(solved(half, difference) / unit),
+                                    [](int, const auto&) {});
   ErrorPolynomial<Size, S> q{};
+  for (std::size_t i = 0; i < Size; ++i) q[i] = lower[i];
   q[Size] = S(1.0);
-  auto adjugate = Matrix<S, Size, Size>::Identity();
-  for (int k = 1; k <= Size; ++k) {
-    adjugate = mapped * adjugate;
-    const S next = -adjugate.trace() / S(static_cast<double>(k));
-    q[static_cast<std::size_t>(Size - k)] = next;
-    for (int i = 0; i < Size; ++i) adjugate(i, i) = adjugate(i, i) + next;
-  }
   return q;
 }
 
@@ -216,12 +193,9 @@ template <int Size, Scalar S>
       detail::absolute(detail::bilinear_polynomial<Size, S>(trusted, S(1.0))[0]);
   const S unit = std::pow(product_of_poles, S(1.0) / S(static_cast<double>(Size)));
   if (!is_finite(unit) || !(unit > S(0.0))) return false;
-  const auto p = detail::bilinear_polynomial<Size, S>(trusted, unit);
-  const auto q = detail::bilinear_polynomial<Size, S>(level.error(S(0.0), leak), unit);
-  if (!is_hurwitz<Size, S>(p) || !(q[1] > S(0.0))) return false;
-  const auto product = detail::half_plane_product<Size, S>(p, q);
-  return leak > S(0.0) ? positive_on_half_line<Size, S>(product)
-                       : detail::positive_but_at_standstill<Size, S>(product);
+  return detail::certified_against<Size, S>(
+      detail::bilinear_polynomial<Size, S>(trusted, unit),
+      detail::bilinear_polynomial<Size, S>(level.error(S(0.0), leak), unit), leak > S(0.0));
 }
 
 /// What is proven of a plant that is held and released, see `holding`.
@@ -270,21 +244,15 @@ struct ErrorAfterHold {
     S before(0.0);
     all = largest = S(0.0);
     for (S& moved : change) {
-      S innovation(0.0);
-      S disturbance(0.0);
-      for (std::size_t j = 0; j < Size; ++j) {
-        innovation = innovation + level.ahead[j] * x[j];
-        disturbance = disturbance + level.row[j] * x[j];
-      }
+      const S innovation = level.ahead.dot(x);
+      const S disturbance = level.row.dot(x);
       moved = gain * (innovation - before);
       before = innovation;
       all = all + absolute(moved);
       if (absolute(disturbance) > largest) largest = absolute(disturbance);
       const auto now = x;
-      for (std::size_t r = 0; r < Size; ++r) {
-        for (std::size_t j = 0; j < Size; ++j) {
-          x[r] = x[r] + error(static_cast<int>(r), static_cast<int>(j)) * now[j];
-        }
+      for (int r = 0; r < Size; ++r) {
+        for (int j = 0; j < Size; ++j) x(r) = x(r) + error(r, j) * now(j);
       }
     }
   }

@@ -65,52 +65,38 @@ struct PartDesign {
   // Matrices near I are stored without I: Phi - I keeps all its digits, Phi does not.
 
   /// (I - k C) Phi - I from Phi - I.
-  static Square corrected(Square step, const Array<S, Size>& output,
+  static Square corrected(const Square& step, const Array<S, Size>& output,
                           const ScaledGain<Size, S>& gain) {
-    const auto ahead = output_ahead<Size>(output, step);  // C Phi
-    for (std::size_t i = 0; i < Size; ++i) {
-      for (std::size_t j = 0; j < Size; ++j) {
-        S& x = step(static_cast<int>(i), static_cast<int>(j));
-        x = x - gain[i] * ahead[j];
-      }
-    }
-    return step;
+    return step - column(gain) * column(output_ahead<Size>(output, step)).transpose();
   }
 
   /// (I + A)(I + B) - I.
   static Square joined(const Square& a, const Square& b) { return a * b + (a + b); }
 
-  /// The largest magnitude of an element; infinite if one is not finite.
-  static S largest(const Square& a) {
-    S most(0.0);
-    for (int i = 0; i < Size; ++i) {
-      for (int j = 0; j < Size; ++j) {
-        if (!all(is_finite(a(i, j)))) return detail::unbounded<S>();
-        const S size = absolute(a(i, j));
-        most = select(most < size, size, most);
-      }
-    }
-    return most;
-  }
-
-  /// -ln of the magnitude of the largest pole of I + A, from its powers; -1 if they are not finite.
-  /// @param units a^degree, units in which the elements of A are of similar size
-  static S decay(Square a, const Array<S, Size>& units) {
-    using std::log;
+  /// A in these units.
+  static Square in_units(Square a, const Array<S, Size>& units) {
     for (std::size_t i = 0; i < Size; ++i) {
       for (std::size_t j = 0; j < Size; ++j) {
         S& x = a(static_cast<int>(i), static_cast<int>(j));
         x = x * (units[j] / units[i]);
       }
     }
+    return a;
+  }
+
+  /// -ln of the magnitude of the largest pole of I + A, from its powers; -1 if they are not finite.
+  /// @param units a^degree, units in which the elements of A are of similar size
+  static S decay(Square a, const Array<S, Size>& units) {
+    using std::log;
+    a = in_units(a, units);
     S share(1.0);
-    for (; all(largest(a) < S(0.25)) && all(share > S(1e-12)); share = share * S(0.5)) {
+    for (; all(largest_magnitude(a) < S(0.25)) && all(share > S(1e-12)); share = share * S(0.5)) {
       a = joined(a, a);
     }
     for (int i = 0; i < Size; ++i) a(i, i) = a(i, i) + S(1.0);
     S radius(0.0);
     for (int squaring = 0; squaring < 40; ++squaring) {
-      const S size = largest(a);
+      const S size = largest_magnitude(a);
       if (!all(is_finite(size))) return S(-1.0);
       if (!all(size > smallest_normal<S>())) return S(1e3);  // all poles at zero
       radius = radius + share * log(size);
@@ -131,18 +117,15 @@ struct PartDesign {
       gain[i] = gains[0][i] / units[i];
       output[i] = output[i] * units[i];
       least = least + S(1e-6) * gain[i] * gain[i];
-      for (std::size_t j = 0; j < Size; ++j) {
-        S& x = step(static_cast<int>(i), static_cast<int>(j));
-        x = x * (units[j] / units[i]);
-      }
     }
+    step = in_units(step, units);
     const Square sample = corrected(step, output, gain);
     // Which V suits best depends on how far the poles are apart. A step in which it rises is added
     // to the sum of which P consists; that lets V fall there, and rise elsewhere. What the gain
     // does not move, as a lag that is only computed, has an error all the same.
     constexpr int rounds = 8;
     for (const double share : {1.0, 0.2}) {
-      Square spread = squared<Size, S>(gain);
+      Square spread = column(gain) * column(gain).transpose();
       for (int i = 0; i < Size; ++i) spread(i, i) = spread(i, i) + least;
       for (int round = 0; round < rounds && longest_step < Longest; ++round) {
         const S rate = S(share) * decay;
@@ -176,13 +159,9 @@ struct PartDesign {
       for (int halvings = 0; samples < next; ++halvings, noise = noise * S(0.5)) {
         if (halvings == 16) break;
         S innovation = noise;
-        for (std::size_t row = 0; row < Size; ++row) {
-          gain[row] = S(0.0);
-          for (std::size_t j = 0; j < Size; ++j) {
-            gain[row] = gain[row] + grown(static_cast<int>(row), static_cast<int>(j)) * output[j];
-          }
+        gain = elements(grown * column(output));
+        for (std::size_t row = 0; row < Size; ++row)
           innovation = innovation + output[row] * gain[row];
-        }
         for (S& k : gain) k = k / innovation;
         Square longer = over;
         for (samples = first; samples < next; ++samples) {
@@ -261,13 +240,7 @@ class ModelGain {
                         index};
       }
       for (std::size_t gap = 0; gap < law.gains_.size(); ++gap) {
-        for (int i = 0; i < Size; ++i) {
-          S sum(0.0);
-          for (std::size_t j = 0; j < design.gains[gap].size(); ++j) {
-            sum = sum + part.whole(i, static_cast<int>(j)) * design.gains[gap][j];
-          }
-          law.gains_[gap][static_cast<std::size_t>(i)] = sum;
-        }
+        law.gains_[gap] = detail::elements(part.whole * detail::column(design.gains[gap]));
       }
       law.longest_step_ = design.longest_step;
       return law;

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <cmath>
+#include <esokit/core/check.hpp>
 #include <esokit/core/matrix.hpp>
 #include <esokit/gain/half_gain.hpp>
 #include <esokit/gain/sampled_gain.hpp>
@@ -142,56 +143,27 @@ ScaledGain<Size, S> placed_gain(const Matrix<S, Size, Size>& step, const Array<S
   }
   // The rows C Phi F^i, i = 0 .. N - 1, and the vector that they map to (0, .., 0, 1).
   Square seen;
-  Array<S, Size> ahead = output;
-  for (std::size_t j = 0; j < Size; ++j) ahead[j] = ahead[j] * unit[j];
+  RowVector<S, Size> row;
   for (int j = 0; j < Size; ++j) {
-    S sum(0.0);
-    for (int i = 0; i < Size; ++i) sum = sum + ahead[static_cast<std::size_t>(i)] * f(i, j);
-    seen(0, j) = ahead[static_cast<std::size_t>(j)] + a * sum;
+    row(j) = output[static_cast<std::size_t>(j)] * unit[static_cast<std::size_t>(j)];
   }
-  for (int i = 1; i < Size; ++i) {
-    for (int j = 0; j < Size; ++j) {
-      S sum(0.0);
-      for (int k = 0; k < Size; ++k) sum = sum + seen(i - 1, k) * f(k, j);
-      seen(i, j) = sum;
-    }
-  }
-  Array<S, Size> x{};
-  x.fill(S(0.0));
+  row += row * f * a;
+  auto x = Vector<S, Size>::Zero();
   for (int i = 0; i < Size; ++i) {
-    S largest(0.0);
-    for (int j = 0; j < Size; ++j) {
-      const S size = detail::absolute(seen(i, j));
-      largest = select(largest < size, size, largest);
-    }
-    for (int j = 0; j < Size; ++j) seen(i, j) = seen(i, j) / largest;
-    if (i == Size - 1) x[Size - 1] = S(1.0) / largest;
+    if (i > 0) row = row * f;
+    const S largest = detail::largest_magnitude(row);
+    detail::set_block(seen, i, 0, row / largest);
+    x(Size - 1) = S(1.0) / largest;
   }
-  detail::solve_in_place(detail::DenseView<S>{seen.data(), Size},
-                         detail::DenseView<S>{x.data(), Size, 1});
+  x = detail::solved(seen, x);
   // The polynomial of F times x, factor by factor.
-  const auto times_f = [&](const Array<S, Size>& v) {
-    Array<S, Size> result{};
-    for (int i = 0; i < Size; ++i) {
-      S sum(0.0);
-      for (int j = 0; j < Size; ++j) sum = sum + f(i, j) * v[static_cast<std::size_t>(j)];
-      result[static_cast<std::size_t>(i)] = sum;
-    }
-    return result;
-  };
   for (std::size_t pair = 0; pair < Size / 2; ++pair) {
-    const auto once = times_f(x);
-    const auto twice = times_f(once);
-    for (std::size_t i = 0; i < Size; ++i) {
-      x[i] = twice[i] + poles.sum[pair] * once[i] + poles.product[pair] * x[i];
-    }
+    const auto once = f * x;
+    x = f * once + once * poles.sum[pair] + x * poles.product[pair];
   }
-  if constexpr (Size % 2 != 0) {
-    const auto once = times_f(x);
-    for (std::size_t i = 0; i < Size; ++i) x[i] = once[i] + poles.last * x[i];
-  }
+  if constexpr (Size % 2 != 0) x = f * x + x * poles.last;
   ScaledGain<Size, S> gain{};
-  for (std::size_t i = 0; i < Size; ++i) gain[i] = x[i] * unit[i] * a;
+  for (std::size_t i = 0; i < Size; ++i) gain[i] = x(static_cast<int>(i)) * unit[i] * a;
   return gain;
 }
 

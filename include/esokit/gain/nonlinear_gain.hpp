@@ -65,32 +65,22 @@ struct PowerSumGain {
   S beta = S(1.0);        ///< beta >= 0
 
   /// k with its exponents classified, see Power.
-  class Prepared {
-   public:
-    /// Copies what it needs.
-    explicit constexpr Prepared(const PowerSumGain& sum) noexcept
-        : gain_alpha_(sum.gain_alpha),
-          gain_beta_(sum.gain_beta),
-          alpha_(sum.alpha - S(1.0)),
-          beta_(sum.beta) {}
+  struct Prepared {
+    S gain_alpha;    ///< K_alpha
+    S gain_beta;     ///< K_beta
+    Power<S> alpha;  ///< x^(alpha-1)
+    Power<S> beta;   ///< x^beta
 
     /// k(x), x > 0.
     [[nodiscard]] S operator()(const S& x) const noexcept {
-      return gain_alpha_ * alpha_(x) + gain_beta_ * beta_(x);
+      return gain_alpha * alpha(x) + gain_beta * beta(x);
     }
-
-   private:
-    friend struct detail::LaneAccess;
-    static constexpr int data_members = 4;
-
-    S gain_alpha_;
-    S gain_beta_;
-    Power<S> alpha_;
-    Power<S> beta_;
   };
 
   /// A function object that is quicker to call.
-  [[nodiscard]] constexpr Prepared prepared() const noexcept { return Prepared(*this); }
+  [[nodiscard]] constexpr Prepared prepared() const noexcept {
+    return {gain_alpha, gain_beta, Power<S>(alpha - S(1.0)), Power<S>(beta)};
+  }
 
   /// k(x), x > 0.
   [[nodiscard]] S operator()(const S& x) const noexcept { return prepared()(x); }
@@ -121,25 +111,18 @@ struct FalGain {
   S linear_width = S(1.0);  ///< delta > 0, in units of the error scale
 
   /// k with its exponent classified, see Power.
-  class Prepared {
-   public:
-    /// Copies what it needs.
-    explicit constexpr Prepared(const FalGain& shape) noexcept
-        : gain_(shape.gain), fal_(shape.exponent, shape.linear_width) {}
+  struct Prepared {
+    S gain;      ///< K
+    Fal<S> fal;  ///< of unit gain
 
     /// k(x), x >= 0.
-    [[nodiscard]] S operator()(const S& x) const noexcept { return gain_ * fal_.gain(x); }
-
-   private:
-    friend struct detail::LaneAccess;
-    static constexpr int data_members = 2;
-
-    S gain_;
-    Fal<S> fal_;
+    [[nodiscard]] S operator()(const S& x) const noexcept { return gain * fal.gain(x); }
   };
 
   /// A function object that is quicker to call.
-  [[nodiscard]] constexpr Prepared prepared() const noexcept { return Prepared(*this); }
+  [[nodiscard]] constexpr Prepared prepared() const noexcept {
+    return {gain, Fal<S>(exponent, linear_width)};
+  }
 
   /// k(x), x > 0.
   [[nodiscard]] S operator()(const S& x) const noexcept { return prepared()(x); }
@@ -188,33 +171,19 @@ constexpr S least_magnitude() noexcept {
 
 /// k(|e| / scale) within its limits; common to the sampled and the continuous law.
 template <Scalar S, class Shape>
-class LimitedGain {
- public:
-  using Function = decltype(prepared(std::declval<const Shape&>()));
-
-  constexpr LimitedGain(const Shape& shape, const S& error_scale, const S& low,
-                        const S& high) noexcept
-      : function_(prepared(shape)), inverse_scale_(S(1.0) / error_scale), low_(low), high_(high) {}
+struct LimitedGain {
+  decltype(prepared(std::declval<const Shape&>())) function;
+  S inverse_scale;
+  S lower;
+  S upper;
 
   [[nodiscard]] ESOKIT_INLINE constexpr S operator()(const S& e) const noexcept {
-    const S x = absolute(e) * inverse_scale_;
-    const S k = function_(select(least_magnitude<S>() < x, x, least_magnitude<S>()));
-    // In this order a NaN becomes `high`.
-    const S from_above = select(k < high_, k, high_);
-    return select(low_ < from_above, from_above, low_);
+    const S x = absolute(e) * inverse_scale;
+    const S k = function(select(least_magnitude<S>() < x, x, least_magnitude<S>()));
+    // In this order a NaN becomes `upper`.
+    const S from_above = select(k < upper, k, upper);
+    return select(lower < from_above, from_above, lower);
   }
-
-  [[nodiscard]] constexpr const S& lower() const noexcept { return low_; }
-  [[nodiscard]] constexpr const S& upper() const noexcept { return high_; }
-
- private:
-  friend struct LaneAccess;
-  static constexpr int data_members = 4;
-
-  Function function_;
-  S inverse_scale_;
-  S low_;
-  S high_;
 };
 
 }  // namespace detail
@@ -240,7 +209,8 @@ class NonlinearGain {
   /// @param gain_min, gain_max limits of k
   constexpr NonlinearGain(const Linear& linear, const Shape& shape, const S& error_scale,
                           const S& gain_min, const S& gain_max) noexcept
-      : linear_(linear), factor_(shape, error_scale, gain_min, gain_max) {}
+      : linear_(linear),
+        factor_{detail::prepared(shape), S(1.0) / error_scale, gain_min, gain_max} {}
 
   /// k(e) l, scaled.
   [[nodiscard]] ESOKIT_INLINE constexpr ScaledGain<Size, S> gain(const S& e) const noexcept {
@@ -272,8 +242,8 @@ class NonlinearGain {
 
   /// Limits of k.
   /// @{
-  [[nodiscard]] constexpr const S& gain_min() const noexcept { return factor_.lower(); }
-  [[nodiscard]] constexpr const S& gain_max() const noexcept { return factor_.upper(); }
+  [[nodiscard]] constexpr const S& gain_min() const noexcept { return factor_.lower; }
+  [[nodiscard]] constexpr const S& gain_max() const noexcept { return factor_.upper; }
   /// @}
 
  private:

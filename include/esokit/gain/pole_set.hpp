@@ -59,31 +59,24 @@ struct SampledPoleSet {
   }
 
   /// beta_0 .. beta_N of prod_i (delta + a_i) = sum_j beta_j delta^(N-j).
-  [[nodiscard]] Array<S, Size + 1> symmetric() const noexcept {
-    Array<std::complex<S>, Size + 1> product{};
-    product[0] = S(1);
-    for (std::size_t i = 0; i < Size; ++i) {
-      for (std::size_t j = i + 1; j > 0; --j) product[j] += product[j - 1] * contractions[i];
-    }
-    Array<S, Size + 1> beta{};
-    for (std::size_t j = 0; j <= Size; ++j) beta[j] = product[j].real();
-    return beta;
-  }
+  [[nodiscard]] Array<S, Size + 1> symmetric() const noexcept { return product<false>(); }
+  /// b_0 .. b_N of prod_i (a_i s + rho_i), for `current_gain`.
+  [[nodiscard]] PoleWeights<Size, S> weights() const noexcept { return product<true>(); }
 
-  /// b_0 .. b_N, for `current_gain`.
-  [[nodiscard]] PoleWeights<Size, S> weights() const noexcept {
-    Array<std::complex<S>, Size + 1> product{};
-    product[0] = S(1);
+ private:
+  /// prod_i (a_i s + w_i), w_i = 1 or rho_i, by rising powers of s.
+  template <bool WithPoles>
+  [[nodiscard]] Array<S, Size + 1> product() const noexcept {
+    Array<std::complex<S>, Size + 1> p{};
+    p[0] = S(1);
     for (std::size_t i = 0; i < Size; ++i) {
-      const std::complex<S> decay = S(1) - contractions[i];
-      for (std::size_t j = i + 1; j > 0; --j) {
-        product[j] = product[j] * decay + product[j - 1] * contractions[i];
-      }
-      product[0] *= decay;
+      const std::complex<S> rest = WithPoles ? S(1) - contractions[i] : S(1);
+      for (std::size_t j = i + 1; j > 0; --j) p[j] = p[j] * rest + p[j - 1] * contractions[i];
+      p[0] *= rest;
     }
-    PoleWeights<Size, S> weights{};
-    for (std::size_t j = 0; j <= Size; ++j) weights[j] = product[j].real();
-    return weights;
+    Array<S, Size + 1> real{};
+    for (std::size_t j = 0; j <= Size; ++j) real[j] = p[j].real();
+    return real;
   }
 };
 
@@ -92,13 +85,11 @@ struct SampledPoleSet {
 /// @return N x 1, row i in 1/s^i
 template <int Size, PlainScalar S>
 Vector<S, Size> continuous_gain(const Array<std::complex<S>, Size>& poles) {
-  Array<std::complex<S>, Size + 1> coefficients{};
-  coefficients[0] = S(1);
-  for (std::size_t i = 0; i < Size; ++i) {
-    for (std::size_t j = i + 1; j > 0; --j) coefficients[j] -= poles[i] * coefficients[j - 1];
-  }
+  SampledPoleSet<Size, S> negative;
+  for (std::size_t i = 0; i < Size; ++i) negative.contractions[i] = -poles[i];
+  const auto coefficients = negative.symmetric();
   Vector<S, Size> gain;
-  for (int i = 0; i < Size; ++i) gain(i) = coefficients[static_cast<std::size_t>(i) + 1].real();
+  for (int i = 0; i < Size; ++i) gain(i) = coefficients[static_cast<std::size_t>(i) + 1];
   return gain;
 }
 

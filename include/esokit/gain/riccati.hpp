@@ -67,10 +67,7 @@ std::optional<Matrix<S, Size, Size>> riccati_covariance(const RiccatiModel<Size,
   S last_change((std::numeric_limits<detail::TableScalar<S>>::max)());
   for (int step = 0; step < most_steps; ++step) {
     const auto predictor = model.transition * gain;
-    auto error = predictor * model.output;
-    for (int i = 0; i < Size; ++i) {
-      for (int j = 0; j < Size; ++j) error(i, j) = (model.transition(i, j) - error(i, j)) * root;
-    }
+    const auto error = (model.transition - predictor * model.output) * root;
     const auto spread = predictor * model.measurement;
     const auto covariance =
         detail::solve_stein<Size, S>(error, detail::plus_product_transposed<Size, Outputs, Size, S>(
@@ -81,10 +78,7 @@ std::optional<Matrix<S, Size, Size>> riccati_covariance(const RiccatiModel<Size,
         model.measurement, crossed, model.output, S(1.0));
     const auto next = detail::solve_positive<Outputs, Size, S>(innovation, crossed);
     if (!next) return std::nullopt;
-    Matrix<S, Size, Outputs> next_gain;
-    for (int i = 0; i < Size; ++i) {
-      for (int j = 0; j < Outputs; ++j) next_gain(i, j) = (*next)(j, i);
-    }
+    const auto next_gain = next->transpose();
     const S change = detail::relative_change(next_gain, gain);
     gain = next_gain;
     // Quadratic convergence ends at the rounding error, when the changes no longer fall.
@@ -192,22 +186,19 @@ template <int Size, Scalar S, class Transition = PascalTransition>
 std::optional<CovarianceFactor<Size, S>> steady_covariance(const CovarianceFactor<Size, S>& noise,
                                                            const S& measurement, const S& inflation,
                                                            const Transition& transition = {}) {
-  using Vec = Matrix<S, Size, 1>;
-  const auto deadbeat = detail::deadbeat_gain<Size, S>(transition);
   RiccatiModel<Size, 1, S> model;
   detail::set_transition(model.transition, transition);
   model.noise = noise.matrix();
   model.measurement(0, 0) = measurement;
   model.inflation = inflation;
-  for (int i = 0; i < Size; ++i) model.output(0, i) = S(i == 0 ? 1.0 : 0.0);
+  model.output = Matrix<S, Size, Size>::Identity().row(0);
   // For other models the recursion below detects it: a gain that tends to zero does not converge.
   if (std::is_same_v<Transition, PascalTransition> && !all(inflation > S(1.0)) &&
       !all(model.noise(Size - 1, Size - 1) > S(0.0))) {
     return std::nullopt;
   }
-  Vec start;
-  for (int i = 0; i < Size; ++i) start(i) = deadbeat[static_cast<std::size_t>(i)];
-  const auto covariance = riccati_covariance<Size, 1, S>(model, start);
+  const auto covariance = riccati_covariance<Size, 1, S>(
+      model, detail::column(detail::deadbeat_gain<Size, S>(transition)));
 
   // The recursion itself is more accurate than the sums above, whose small variances are lost in
   // the rounding of the large ones, so it is run at the end. If poles near zero leave the sums no

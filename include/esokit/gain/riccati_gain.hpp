@@ -74,7 +74,8 @@ class RiccatiGain {
   template <class T>
   using with_scalar =
       RiccatiGain<Size, T, TableSize,
-                  typename detail::ForScalar<Transition, T>::type>;  ///< with another scalar
+                  std::conditional_t<std::is_empty_v<Transition>, Transition,
+                                     MatrixTransition<Size, T>>>;  ///< with another scalar
 
   /// The law in its recursive mode; `freeze` changes the mode.
   explicit RiccatiGain(const Settings& settings, const Transition& transition = {}) noexcept
@@ -311,9 +312,7 @@ class RiccatiGain {
   ESOKIT_INLINE constexpr void advance_alone() noexcept {
     if (rests()) [[likely]] {
       note(standing);
-      if constexpr (TableSize > 0) {
-        if (place_ <= TableSize) next_of_table();
-      }
+      if (TableSize > 0 && place_ <= TableSize) next_of_table();
     } else {
       recur();
     }
@@ -423,17 +422,10 @@ class RiccatiGain {
     const S sum = variance + noise;
     // If P- and R are zero, the prediction is exact and nothing is corrected. The inverse of a
     // subnormal sum would overflow.
-    if constexpr (PlainScalar<S>) {
-      const bool some = sum >= detail::smallest_normal<S>();
-      const S inverse = S(1.0) / (some ? sum : S(1.0));
-      now_.share = variance * inverse;
-      now_.rest = some ? noise * inverse : S(1.0);
-    } else {
-      const auto some = sum >= detail::smallest_normal<S>();
-      const S inverse = S(1.0) / select(some, sum, S(1.0));
-      now_.share = variance * inverse;
-      now_.rest = select(some, S(noise * inverse), S(1.0));
-    }
+    const auto some = sum >= detail::smallest_normal<S>();
+    const S inverse = S(1.0) / select(some, sum, S(1.0));
+    now_.share = variance * inverse;
+    now_.rest = select(some, S(noise * inverse), S(1.0));
     now_.gain = now_.factor.gain(now_.share);
   }
 

@@ -60,6 +60,72 @@ void solve_in_place(DenseView<T> a, DenseView<T> b) noexcept {
   }
 }
 
+/// The magnitude of each element.
+template <int Rows, int Columns, class S>
+constexpr Matrix<S, Rows, Columns> magnitudes(Matrix<S, Rows, Columns> matrix) noexcept {
+  for (S& element : matrix) element = absolute(element);
+  return matrix;
+}
+
+/// a^-1 b, see solve_in_place.
+template <int Size, int Columns, Scalar S>
+Matrix<S, Size, Columns> solved(Matrix<S, Size, Size> a, Matrix<S, Size, Columns> b) noexcept {
+  solve_in_place(DenseView<S>{a.data(), Size}, DenseView<S>{b.data(), Size, Columns});
+  return b;
+}
+
+/// The Rows x Columns elements of `all` from element (i, j) on.
+template <int Rows, int Columns, int AllRows, int AllColumns, class S>
+constexpr Matrix<S, Rows, Columns> block(const Matrix<S, AllRows, AllColumns>& all, int i,
+                                         int j) noexcept {
+  Matrix<S, Rows, Columns> part;
+  for (int c = 0; c < Columns; ++c) {
+    for (int r = 0; r < Rows; ++r) part(r, c) = all(i + r, j + c);
+  }
+  return part;
+}
+
+/// Replaces the elements of `all` from element (i, j) on by `part`.
+template <int Rows, int Columns, int AllRows, int AllColumns, class S>
+constexpr void set_block(Matrix<S, AllRows, AllColumns>& all, int i, int j,
+                         const Matrix<S, Rows, Columns>& part) noexcept {
+  for (int c = 0; c < Columns; ++c) {
+    for (int r = 0; r < Rows; ++r) all(i + r, j + c) = part(r, c);
+  }
+}
+
+/// a_0 .. a_(n-1) of det(s I - A) = s^n + a_(n-1) s^(n-1) + .. + a_0, by the Faddeev-LeVerrier
+/// algorithm. @param each called with n - 1 .. 0 and the coefficient of this power in adj(s I - A)
+template <int Size, class S, class Each>
+constexpr Array<S, Size> characteristic(const Matrix<S, Size, Size>& a, const Each& each) noexcept {
+  Array<S, Size> all{};
+  auto adjugate = Matrix<S, Size, Size>::Identity();
+  for (int k = Size - 1; k >= 0; --k) {
+    each(k, adjugate);
+    adjugate = a * adjugate;
+    const S next = -adjugate.trace() / integer<S>(Size - k);
+    all[static_cast<std::size_t>(k)] = next;
+    for (int i = 0; i < Size; ++i) adjugate(i, i) = adjugate(i, i) + next;
+  }
+  return all;
+}
+
+/// A column of these elements, and the elements of a column.
+/// @{
+template <class S, std::size_t Size>
+constexpr Vector<S, static_cast<int>(Size)> column(const std::array<S, Size>& x) noexcept {
+  Vector<S, static_cast<int>(Size)> all;
+  for (int i = 0; i < all.size(); ++i) all(i) = x[static_cast<std::size_t>(i)];
+  return all;
+}
+template <class S, int Size>
+constexpr Array<S, Size> elements(const Vector<S, Size>& x) noexcept {
+  Array<S, Size> all{};
+  for (int i = 0; i < Size; ++i) all[static_cast<std::size_t>(i)] = x(i);
+  return all;
+}
+/// @}
+
 /// A^-1 B for a symmetric positive definite A, by Cholesky; nothing if A is not positive definite.
 template <int Size, int Columns, Scalar S>
 std::optional<Matrix<S, Size, Columns>> solve_positive(const Matrix<S, Size, Size>& a,

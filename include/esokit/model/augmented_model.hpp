@@ -47,11 +47,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   static constexpr int la = Parts.actuator;
   static constexpr int lf = Parts.sensor;
   static constexpr int m = Parts.constants;
-  static_assert(n >= 1, "esokit: the plant order must be at least 1");
-  static_assert(m >= 1, "esokit: at least one extended state is needed");
-  static_assert(la >= 0 && la <= 2 && lf >= 0 && lf <= 2, "esokit: a lag has order 0, 1 or 2");
-  static_assert(Parts.resonators >= 0 && Parts.first_order >= 0,
-                "esokit: the number of parts must not be negative");
+  static_assert(Parts.states == 0, "esokit: a whole plant needs model/plant_model.hpp");
 
  public:
   static constexpr ModelParts parts = Parts;  ///< what is known
@@ -115,7 +111,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
     Estimate z = Estimate::Zero();
     z(0) = y;
     z(order) = -(input_gain_ * u);
-    if constexpr (lf > 0) z(size - lf) = y;
+    z(Base::measured_row) = y;
     return z;
   }
 
@@ -253,9 +249,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   }
   /// T^n / n! d. @param d unit of y^(n)
   [[nodiscard]] constexpr S scaled_constant(const S& d) const noexcept {
-    S value = d;
-    for (int j = 1; j <= n; ++j) value = value * (sample_time_ / number(j));
-    return value;
+    return this->of_degree(n, d);
   }
   /// b0 v under which the plant would stand still at its present y with the present d; unit of
   /// y^(n).
@@ -311,47 +305,23 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   /// act(s) s^derivative applied to d without its constant, as a row over the states, in units of
   /// T^n / n!; act is the actuator's denominator.
   static State others_filtered(const Settings& settings, const S& time, int derivative) noexcept {
-    State row{};
-    row.fill(S(0));
+    constexpr int parts_of_d = extension - lf;
+    auto rates = Matrix<S, parts_of_d, parts_of_d>::Zero();
+    for (int i = 0; i + 1 < m; ++i) rates(i, i + 1) = number(n + i + 1);
+    detail::set_sinusoid_rates(rates, m, settings.resonators, settings.first_order, time);
+    auto row = RowVector<S, parts_of_d>::Zero();  // d and its derivatives
+    row(0) = S(1);
+    for (int c = 0; c < Parts.resonators; ++c) row(m + 2 * c) = S(1);
+    for (int c = m + 2 * Parts.resonators; c < parts_of_d; ++c) row(c) = S(1);
     const auto lag = detail::scaled_lag(settings.actuator, time);
-    const int d = lf + order;
-    for (int k = 0; k <= la; ++k) {
-      const int i = k + derivative;  // d^(i)
-      if (i >= 1 && i < m) {
-        row[static_cast<std::size_t>(d + i)] =
-            lag[static_cast<std::size_t>(k)] * detail::factorial_ratio<S>(n + i, n);
-      }
+    auto sum = RowVector<S, parts_of_d>::Zero();
+    for (int i = 0; i <= la + derivative; ++i) {
+      if (i >= derivative) sum += row * lag[static_cast<std::size_t>(i - derivative)];
+      row = row * rates;
     }
-    for (int c = 0; c < Parts.resonators; ++c) {
-      const auto& resonance = settings.resonators[static_cast<std::size_t>(c)];
-      const S w = resonance.frequency * time;
-      S q(1);
-      S r(0);
-      for (int k = 0; k <= la + derivative; ++k) {
-        if (k >= derivative) {
-          const S weight = lag[static_cast<std::size_t>(k - derivative)];
-          S& of_q = row[static_cast<std::size_t>(d + m + 2 * c)];
-          S& of_r = row[static_cast<std::size_t>(d + m + 2 * c + 1)];
-          of_q = of_q + weight * q;
-          of_r = of_r + weight * r;
-        }
-        const S next_r = w * q - S(2) * resonance.damping * w * r;
-        q = -(w * r);
-        r = next_r;
-      }
-    }
-    for (int c = 0; c < Parts.first_order; ++c) {
-      const S rate = -time / settings.first_order[static_cast<std::size_t>(c)];
-      S power(1);
-      for (int k = 0; k <= la + derivative; ++k) {
-        if (k >= derivative) {
-          S& of_it = row[static_cast<std::size_t>(d + m + 2 * Parts.resonators + c)];
-          of_it = of_it + lag[static_cast<std::size_t>(k - derivative)] * power;
-        }
-        power = power * rate;
-      }
-    }
-    return row;
+    State all{};
+    for (int j = 1; j < parts_of_d; ++j) all[static_cast<std::size_t>(lf + order + j)] = sum(j);
+    return all;
   }
 
   /// T A, and in the last column T B for a u in units in which b T^order / order! is one.
@@ -388,11 +358,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
     if constexpr (part_lf > 0) less.sensor = rest_.settings.sensor;
     less.resonators = present().resonators;
     less.first_order = rest_.settings.first_order;
-    const auto with_input = Part::rates(less, sample_time_);
-    Matrix<S, part_size, part_size> rates;
-    for (int i = 0; i < part_size; ++i) {
-      for (int j = 0; j < part_size; ++j) rates(i, j) = with_input(i, j);
-    }
+    const auto rates = detail::block<part_size, part_size>(Part::rates(less, sample_time_), 0, 0);
 
     CorrectedPart<part_size, size, Parts.resonators, S> part;
     part.step = detail::exp_minus_identity(rates);
@@ -409,7 +375,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
     derivative(part_d) = S(1);
     for (int r = 0; r < n; ++r) part.whole(lf + r, part_lf + r) = S(1);
     for (int r = n; r <= order; ++r) {
-      for (int j = 0; j < part_size; ++j) part.whole(lf + r, j) = derivative(j);
+      detail::set_block(part.whole, lf + r, 0, derivative);
       derivative = derivative * rates / number(r + 1);
     }
     for (int i = 1; i < extension - lf; ++i) part.whole(lf + order + i, part_d + i) = S(1);
@@ -418,11 +384,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
       for (int i = 0; i < lf; ++i) part.whole(i, i) = S(1);
     } else {
       // The sensor's error follows from the errors of the other states.
-      const auto shown = detail::shown_by_sensor(rest_.settings.sensor, sample_time_, rates);
-      for (int j = 0; j < part_size; ++j) {
-        part.output[static_cast<std::size_t>(j)] = shown(0, j);
-        for (int i = 0; i < lf; ++i) part.whole(i, j) = shown(i, j);
-      }
+      part.set_shown(detail::shown_by_sensor(rest_.settings.sensor, sample_time_, rates));
     }
     part.pairs = detail::own_pairs(less.resonators);
     return part;
@@ -431,10 +393,8 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   AugmentedModel(const Settings& settings, const S& input_gain, const S& sample_time) noexcept
       : Base(input_gain, sample_time), rest_{settings} {
     const auto lag = detail::scaled_lag(settings.actuator, sample_time);
-    if constexpr (la > 0) {
-      input_gain_ = input_gain_ * lag[0];
-      for (int i = 0; i < la; ++i) input_gain_ = input_gain_ * rate_;
-    }
+    input_gain_ = input_gain_ * lag[0];
+    for (int i = 0; i < la; ++i) input_gain_ = input_gain_ * rate_;
     scaled_input_gain_ = input_gain * lag[0];
     for (int j = 1; j <= order; ++j) {
       scaled_input_gain_ = scaled_input_gain_ * (j <= n ? sample_time : S(1)) / number(j);
@@ -462,8 +422,8 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
 
 /// Distinguishes the type in snapshots.
 template <ModelParts Parts, Scalar S>
-inline constexpr std::uint32_t type_tag<AugmentedModel<Parts, S>> =
-    make_type_tag<S>("AugmentedModel", Parts.order, Parts.plant_poles, Parts.actuator, Parts.sensor,
-                     Parts.constants, Parts.resonators, Parts.first_order, Parts.follows_speed);
+inline constexpr std::uint32_t type_tag<AugmentedModel<Parts, S>> = make_type_tag<S>(
+    "AugmentedModel", Parts.order, Parts.plant_poles, Parts.actuator, Parts.sensor, Parts.constants,
+    Parts.resonators, Parts.first_order, Parts.follows_speed, Parts.states);
 
 }  // namespace esokit

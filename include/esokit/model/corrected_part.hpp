@@ -5,6 +5,7 @@
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/scalar.hpp>
 #include <esokit/core/unroll.hpp>
+#include <esokit/math/dense.hpp>
 
 namespace esokit {
 
@@ -25,6 +26,13 @@ struct CorrectedPart {
   Array<int, Size> states{};          ///< their indices among the model's states
   Matrix<S, Whole, Size> whole;       ///< maps a correction of the part to one of the whole model
   Array<Array<S, 2>, Pairs> pairs{};  ///< real and imaginary part of a pair of poles, 1/s
+
+  /// The measured states follow from those of the part. @param shown by these rows
+  template <int Rows>
+  void set_shown(const Matrix<S, Rows, Size>& shown) noexcept {
+    detail::set_block(whole, 0, 0, shown);
+    for (int j = 0; j < Size; ++j) output[static_cast<std::size_t>(j)] = shown(0, j);
+  }
 };
 
 /// The CorrectedPart of a model that is corrected as a whole; the placement places all poles except

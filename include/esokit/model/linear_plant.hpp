@@ -179,10 +179,7 @@ struct LinearPlant {
       return first_gain(0).gain(0);
     } else {
       Matrix<ScalarType, Outputs, Inputs> gains;
-      for (int i = 0; i < Outputs; ++i) {
-        const auto row = first_gain(i).gain;
-        for (int j = 0; j < Inputs; ++j) gains(i, j) = row(j);
-      }
+      for (int i = 0; i < Outputs; ++i) detail::set_block(gains, i, 0, first_gain(i).gain);
       return gains;
     }
   }
@@ -190,15 +187,7 @@ struct LinearPlant {
   /// a_0 .. a_(n-1) of det(s I - A) = s^n + a_(n-1) s^(n-1) + .. + a_0: the plant's poles, as
   /// `chain` and `.plant` of an AugmentedModel take them.
   [[nodiscard]] constexpr Array<ScalarType, States> coefficients() const noexcept {
-    Array<ScalarType, States> all{};
-    auto power = Matrix<ScalarType, States, States>::Identity();  // Faddeev-LeVerrier algorithm
-    for (int k = 1; k <= States; ++k) {
-      power = a * power;
-      const ScalarType next = -power.trace() / detail::integer<ScalarType>(k);
-      all[static_cast<std::size_t>(States - k)] = next;
-      for (int i = 0; i < States; ++i) power(i, i) = power(i, i) + next;
-    }
-    return all;
+    return detail::characteristic(a, [](int, const auto&) {});
   }
 
  private:
@@ -224,10 +213,10 @@ struct LinearPlant {
   [[nodiscard]] constexpr Reached first_gain(int output) const noexcept {
     using Table = detail::TableScalar<ScalarType>;
     RowVector<ScalarType, States> row = c.row(output);
-    RowVector<ScalarType, States> magnitude = magnitudes(row);
+    RowVector<ScalarType, States> magnitude = detail::magnitudes(row);
     for (int degree = 1; degree <= States; ++degree) {
       const auto gain = row * b;
-      const auto size = magnitude * magnitudes(b);
+      const auto size = magnitude * detail::magnitudes(b);
       const ScalarType rounding(std::numeric_limits<Table>::epsilon() *
                                 static_cast<Table>(2 * States * degree));
       for (int j = 0; j < Inputs; ++j) {
@@ -235,16 +224,9 @@ struct LinearPlant {
         if (lost || !all(detail::absolute(gain(j)) <= rounding * size(j))) return {degree, gain};
       }
       row = row * a;
-      magnitude = magnitude * magnitudes(a);
+      magnitude = magnitude * detail::magnitudes(a);
     }
     return {0, {}};
-  }
-
-  template <int Rows, int Columns>
-  static constexpr Matrix<ScalarType, Rows, Columns> magnitudes(
-      Matrix<ScalarType, Rows, Columns> matrix) noexcept {
-    for (ScalarType& element : matrix) element = detail::absolute(element);
-    return matrix;
   }
 };
 
@@ -263,14 +245,10 @@ constexpr Expected<LinearPlant<States + More, S, Inputs, Outputs>, Error<S>> wit
   if (!rules) return rules.error();
   LinearPlant<States + More, S, Inputs, Outputs> bigger;
   bigger.dead_time = plant.dead_time;
-  for (int i = 0; i < States; ++i) {
-    for (int j = 0; j < States; ++j) bigger.a(i, j) = plant.a(i, j);
-    for (int j = 0; j < Inputs; ++j) {
-      bigger.b(i, j) = plant.b(i, j);
-      bigger.e(i, j) = plant.e(i, j);
-    }
-    for (int j = 0; j < Outputs; ++j) bigger.c(j, i) = plant.c(j, i);
-  }
+  set_block(bigger.a, 0, 0, plant.a);
+  set_block(bigger.b, 0, 0, plant.b);
+  set_block(bigger.e, 0, 0, plant.e);
+  set_block(bigger.c, 0, 0, plant.c);
   const S rate = S(1.0) / time_constant;
   for (int j = States; j < States + More; ++j) bigger.a(j, j) = -rate;
   connect(bigger, rate);
@@ -288,14 +266,10 @@ constexpr Expected<LinearPlant<States + More, S, Inputs, Outputs>, Error<S>> wit
 template <int States, Scalar S, int Inputs, int Outputs>
 constexpr Expected<LinearPlant<States + Inputs, S, Inputs, Outputs>, Error<S>> with_lag(
     const LinearPlant<States, S, Inputs, Outputs>& plant, const S& time_constant) {
-  return detail::with_first_order<Inputs>(plant, time_constant, [](auto& p, const S& rate) {
-    for (int j = 0; j < Inputs; ++j) {
-      for (int i = 0; i < States; ++i) {
-        p.a(i, States + j) = p.b(i, j);
-        p.b(i, j) = S(0.0);
-      }
-      p.b(States + j, j) = rate;
-    }
+  return detail::with_first_order<Inputs>(plant, time_constant, [&](auto& p, const S& rate) {
+    detail::set_block(p.a, 0, States, plant.b);
+    p.b = Matrix<S, States + Inputs, Inputs>::Zero();
+    detail::set_block(p.b, States, 0, Matrix<S, Inputs, Inputs>::Identity() * rate);
   });
 }
 
@@ -305,14 +279,10 @@ constexpr Expected<LinearPlant<States + Inputs, S, Inputs, Outputs>, Error<S>> w
 template <int States, Scalar S, int Inputs, int Outputs>
 constexpr Expected<LinearPlant<States + Outputs, S, Inputs, Outputs>, Error<S>> with_sensor(
     const LinearPlant<States, S, Inputs, Outputs>& plant, const S& time_constant) {
-  return detail::with_first_order<Outputs>(plant, time_constant, [](auto& p, const S& rate) {
-    for (int j = 0; j < Outputs; ++j) {
-      for (int i = 0; i < States; ++i) {
-        p.a(States + j, i) = p.c(j, i) * rate;
-        p.c(j, i) = S(0.0);
-      }
-      p.c(j, States + j) = S(1.0);
-    }
+  return detail::with_first_order<Outputs>(plant, time_constant, [&](auto& p, const S& rate) {
+    detail::set_block(p.a, States, 0, plant.c * rate);
+    p.c = Matrix<S, Outputs, States + Outputs>::Zero();
+    detail::set_block(p.c, 0, States, Matrix<S, Outputs, Outputs>::Identity());
   });
 }
 

@@ -39,6 +39,9 @@ class MatrixModel {
   static constexpr int extension = size - order;              ///< all rows besides the plant's
   static constexpr int measured_rows = Shape::measured_rows;  ///< states of a sensor
 
+  /// Row of the estimate that is measured: y, or as the sensor shows it.
+  static constexpr int measured_row = measured_rows > 0 ? size - measured_rows : 0;
+
   using State = Array<S, size>;      ///< x, scaled, N elements
   using Estimate = Vector<S, size>;  ///< z, physical units, N x 1
 
@@ -78,9 +81,7 @@ class MatrixModel {
   }
 
   /// The measured value in an estimate: y as the sensor shows it.
-  [[nodiscard]] static constexpr S measured(const Estimate& z) noexcept {
-    return z(measured_rows > 0 ? size - measured_rows : 0);
-  }
+  [[nodiscard]] static constexpr S measured(const Estimate& z) noexcept { return z(measured_row); }
   /// The sine of resonator 0 .. k - 1 in d.
   [[nodiscard]] static Phasor<S> sinusoidal_disturbance(const Estimate& z, int resonator) noexcept
       requires(Shape::parts.resonators > 0) {
@@ -121,17 +122,13 @@ class MatrixModel {
     State x{};
     for (int row = 0; row < size; ++row) {
       const int state = state_of_row(row);
-      S value = z(row);
-      for (int j = 1; j <= degree(state); ++j) value = value * (sample_time_ / static_cast<S>(j));
-      x[static_cast<std::size_t>(state)] = value;
+      x[static_cast<std::size_t>(state)] = of_degree(degree(state), z(row));
     }
     return x;
   }
   /// D in the scaling of the state. @param disturbance unit of y^(order)
   [[nodiscard]] constexpr S scaled_disturbance(const S& disturbance) const noexcept {
-    S value = disturbance;
-    for (int j = 1; j <= order; ++j) value = value * (sample_time_ / static_cast<S>(j));
-    return value;
+    return of_degree(order, disturbance);
   }
 
   /// A number that is finite only if all estimates are finite.
@@ -198,6 +195,12 @@ class MatrixModel {
   /// @param input_gain b @param sample_time T, s
   MatrixModel(const S& input_gain, const S& sample_time) noexcept
       : rate_(S(1) / sample_time), input_gain_(input_gain), sample_time_(sample_time) {}
+
+  /// value T^degree / degree!.
+  [[nodiscard]] constexpr S of_degree(int degree, S value) const noexcept {
+    for (int j = 1; j <= degree; ++j) value = value * (sample_time_ / static_cast<S>(j));
+    return value;
+  }
 
   /// @param all Phi - I, and as last column Gamma for a u in units in which b T^order / order! is
   /// one (not read if u only adds to a state)

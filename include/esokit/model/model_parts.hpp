@@ -1,6 +1,6 @@
 /// @file
 /// The parts of a model: lags of actuator and sensor, and disturbances that are constant,
-/// sinusoidal or decaying. Common to AugmentedModel and LinearPlantModel.
+/// sinusoidal or decaying.
 #pragma once
 
 #include <cmath>
@@ -15,6 +15,8 @@ namespace esokit {
 /// Which parts a model has. Their numbers are in its Settings.
 struct ModelParts {
   int order = 1;               ///< n: the plant is y^(n) = -a_(n-1) y^(n-1) - .. - a_0 y + d + b0 v
+  int states = 0;              ///< above 0: the plant is a LinearPlant of so many states, and the
+                               ///< order its relative degree; it contains the actuator
   bool plant_poles = false;    ///< a_0 .. a_(n-1) are known; false: they are zero, a chain
   int actuator = 0;            ///< order of the lag from u to v: 0 (v = u), 1 or 2
   int sensor = 0;              ///< order of the lag from y to the measured value: 0, 1 or 2
@@ -70,12 +72,6 @@ namespace detail {
 template <PlainScalar S>
 Phasor<S> phasor_of(const S& q, const S& r) noexcept {
   return {std::hypot(q, r), std::atan2(q, r)};
-}
-
-/// Number of states of the disturbance: its integrators, two for each resonator, one for each
-/// first-order disturbance.
-constexpr int disturbance_size(const ModelParts& parts) noexcept {
-  return parts.constants + 2 * parts.resonators + parts.first_order;
 }
 
 /// Coefficients of a lag of order l with denominator s^l + .. + a_0, in units of T: T^(l-i) a_i for
@@ -157,20 +153,12 @@ Matrix<S, Order, Size> shown_by_sensor(const Lag<Order, S>& sensor, const S& tim
   } else {
     shows += rates * (lag[1] / lag[0]) + rates * rates / lag[0];
   }
-  auto transposed = shows.transpose();
-  Array<S, Size> output{};
-  output.fill(S(0));
-  output[0] = S(1);
-  solve_in_place(DenseView<S>{transposed.data(), Size}, DenseView<S>{output.data(), Size, 1});
+  auto output = Vector<S, Size>::Zero();
+  output(0) = S(1);
+  const auto first = solved(shows.transpose(), output).transpose();
   Matrix<S, Order, Size> shown;
-  for (int j = 0; j < Size; ++j) shown(0, j) = output[static_cast<std::size_t>(j)];
-  if constexpr (Order == 2) {
-    for (int j = 0; j < Size; ++j) {
-      S slope(0);
-      for (int i = 0; i < Size; ++i) slope = slope + shown(0, i) * rates(i, j);
-      shown(1, j) = slope / (sensor.frequency * time);
-    }
-  }
+  set_block(shown, 0, 0, first);
+  if constexpr (Order == 2) set_block(shown, 1, 0, first * rates / (sensor.frequency * time));
   return shown;
 }
 
@@ -220,6 +208,13 @@ void check_sensor(Rules<S>& rules, const Lag<Order, S>& sensor, const S& time) {
             "model.sensor.damping", sensor, time);
 }
 
+/// Element `index` must differ from those before it, of which `other` is one.
+template <PlainScalar S>
+void check_apart(Rules<S>& rules, const char* field, const S& value, int index, const S& other) {
+  rules.require(absolute(S(value - other)) > S(1e-3) * value,
+                {field, value, "must differ by a thousandth of itself from", index, other, true});
+}
+
 template <PlainScalar S, std::size_t Sines>
 void check_resonators(Rules<S>& rules, const std::array<Resonance<S>, Sines>& resonators,
                       const S& time) {
@@ -234,10 +229,8 @@ void check_resonators(Rules<S>& rules, const std::array<Resonance<S>, Sines>& re
             "model.resonators.damping", resonance.damping, "must be 0 or above, below 1", c)
         .not_negative("model.resonators.capture_bandwidth", resonance.capture_bandwidth, c);
     for (std::size_t before = 0; before < i; ++before) {
-      const S& other = resonators[before].frequency;
-      rules.require(absolute(S(resonance.frequency - other)) > S(1e-3) * resonance.frequency,
-                    {"model.resonators.frequency", resonance.frequency,
-                     "must differ by a thousandth of itself from", c, other, true});
+      check_apart(rules, "model.resonators.frequency", resonance.frequency, c,
+                  resonators[before].frequency);
     }
   }
 }
@@ -252,10 +245,7 @@ void check_first_order(Rules<S>& rules, const std::array<S, FirstOrders>& first_
         .require(tau * S(100) >= time, "model.first_order", tau,
                  "must be at least a hundredth of sample_time", c);
     for (std::size_t before = 0; before < i; ++before) {
-      const S& other = first_order[before];
-      rules.require(
-          absolute(S(tau - other)) > S(1e-3) * tau,
-          {"model.first_order", tau, "must differ by a thousandth of itself from", c, other, true});
+      check_apart(rules, "model.first_order", tau, c, first_order[before]);
     }
   }
 }

@@ -233,12 +233,12 @@ class ExtendedStateFilter
     const Covariance of_states = law().covariance();
     // Multiplied in two steps, from both sides: the product of the units may overflow when P does
     // not.
-    const Array<S, N> units = physical_units(this->model());
+    const Estimate units = physical_units(this->model());
     Covariance p;
     for (int i = 0; i < N; ++i) {
       for (int j = 0; j <= i; ++j) {
         const S& scaled = of_states(PlantModel::state_of_row(i), PlantModel::state_of_row(j));
-        p(i, j) = detail::clipped(S(scaled * units[index(i)] * units[index(j)]));
+        p(i, j) = detail::clipped(S(scaled * units(i) * units(j)));
         p(j, i) = p(i, j);
       }
     }
@@ -301,23 +301,18 @@ class ExtendedStateFilter
   }
 
   static Expected<Law, Error<S>> design(const Config& config, const PlantModel& plant) {
-    return detail::FilterDesign<Law, PlantModel, has_model>::make(config, plant);
+    return detail::FilterDesign<Law, PlantModel, has_model, Config>::make(config, plant);
   }
-
-  static constexpr std::size_t index(int i) noexcept { return static_cast<std::size_t>(i); }
 
   [[nodiscard]] bool gated() const noexcept { return law().is_watched(); }
   [[nodiscard]] const Law& law() const noexcept { return std::get<0>(this->laws()); }
   [[nodiscard]] Law& law() noexcept { return std::get<0>(this->laws()); }
 
   /// Factors from the states in the scaling of the model to physical units.
-  static Array<S, N> physical_units(const PlantModel& plant) noexcept {
+  static Estimate physical_units(const PlantModel& plant) noexcept {
     typename PlantModel::State ones;
     ones.fill(S(1.0));
-    const Estimate physical = plant.physical(ones);
-    Array<S, N> units;
-    for (int r = 0; r < N; ++r) units[index(r)] = physical(r);
-    return units;
+    return plant.physical(ones);
   }
 
   // A function of its own, so that the step of a frozen filter contains only a tail call.
@@ -338,26 +333,24 @@ class ExtendedStateFilter
 
   /// Adds sat(fbar(x+, u, t + T) - fbar(x, u, t)) to d: (6), with the input that the printed
   /// prediction of x+ lacks.
-  void shift_by_model(const Estimate& before) noexcept {
-    if constexpr (has_model) {
-      const S time = this->sample_time();
-      const S t = detail::integer<S>(rest_.sample) * time;
-      const S u = this->applied_input();
-      Vector<S, Order> x = before.template head<Order>();
-      const S now = rest_.set.nominal_model(x, u, t);
-      // x+: predicted along the chain, with fbar in place of the estimated disturbance.
-      Estimate start = before;
-      start(Order) = now;
-      const S drive = Chain::scaled_input_gain(this->input_gain(), time) * u;
-      const auto ahead = Chain::template predict<1>(Chain::scaled(start, time), Array<S, 1>{drive});
-      x = Chain::physical(ahead, S(S(1.0) / time)).template head<Order>();
-      const S change = rest_.set.nominal_model(x, u, S(t + time)) - now;
-      const S low = select(change < -rest_.set.change_bound, S(-rest_.set.change_bound), change);
-      const S limited = select(rest_.set.change_bound < low, rest_.set.change_bound, low);
-      const S sum = this->total_disturbance() + limited;
-      this->shift_disturbance(select(is_finite(sum), limited, S(0.0)));
-      ++rest_.sample;
-    }
+  void shift_by_model(const Estimate& before) noexcept requires(has_model) {
+    const S time = this->sample_time();
+    const S t = detail::integer<S>(rest_.sample) * time;
+    const S u = this->applied_input();
+    Vector<S, Order> x = before.template head<Order>();
+    const S now = rest_.set.nominal_model(x, u, t);
+    // x+: predicted along the chain, with fbar in place of the estimated disturbance.
+    Estimate start = before;
+    start(Order) = now;
+    const S drive = Chain::scaled_input_gain(this->input_gain(), time) * u;
+    const auto ahead = Chain::template predict<1>(Chain::scaled(start, time), Array<S, 1>{drive});
+    x = Chain::physical(ahead, S(S(1.0) / time)).template head<Order>();
+    const S change = rest_.set.nominal_model(x, u, S(t + time)) - now;
+    const S low = select(change < -rest_.set.change_bound, S(-rest_.set.change_bound), change);
+    const S limited = select(rest_.set.change_bound < low, rest_.set.change_bound, low);
+    const S sum = this->total_disturbance() + limited;
+    this->shift_disturbance(select(is_finite(sum), limited, S(0.0)));
+    ++rest_.sample;
   }
 
   struct Set {

@@ -132,26 +132,21 @@ class MimoExtendedStateFilter {
     Array<bool, outputs> used{};
     used.fill(true);
     Output e = Output::Zero();
+    int left = outputs;
     for (int i = 0; i < outputs; ++i) {
       e(i) = y(i) - state_(first(i));
       const bool due = missed_[index(i)] > max_gap_ + 1;
       if (is_finite(e(i)) && !due) continue;
       used[index(i)] = false;
+      --left;
       e(i) = S(0);
       status |= due ? restart_chain(i, y(i)) : StepStatus::measurement_rejected;
     }
     // If the estimate would not be finite, channels are left out, the one furthest from its
     // prediction first, until it is.
     bool changed = has(status, StepStatus::restarted);
-    for (int left = outputs; left > 0; --left) {
-      bool any_used = false;
-      bool all_used = true;
-      for (const bool channel : used) {
-        any_used = any_used || channel;
-        all_used = all_used && channel;
-      }
-      if (!any_used) break;
-      if (!all_used) {
+    for (; left > 0; --left) {
+      if (left < outputs) {
         recursion_.standing = false;
         recursion_.prepare(used);
         changed = true;

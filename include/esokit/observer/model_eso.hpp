@@ -32,8 +32,17 @@ using ModelCascadeEso =
     CascadeEso<AugmentedModel<Parts, S>::order, Levels, S, AugmentedModel<Parts, S>::extension,
                Placement, AugmentedModel<Parts, S>>;
 
-/// LinearEso of any linear plant, with a sensor. The disturbance may be sinusoidal or decay, and
-/// need not enter where u does:
+namespace detail {
+
+constexpr ModelParts of_plant(ModelParts parts, int states) noexcept {
+  parts.states = states;
+  return parts;
+}
+
+}  // namespace detail
+
+/// LinearEso of any linear plant, with a sensor: a ModelEso with ModelParts::states. The
+/// disturbance may be sinusoidal or decay, and need not enter where u does:
 ///
 /// ```cpp
 /// using Eso = PlantEso<3, ModelParts{.order = 2, .resonators = 1}>;
@@ -41,20 +50,15 @@ using ModelCascadeEso =
 ///                       .sample_time = 1e-3,
 ///                       .model = {.plant = plant, .resonators = {{{.frequency = 314}}}}});
 /// ```
-///
-/// See LinearPlantModel.
 template <int States, ModelParts Parts, Scalar S = double, class Placement = EqualPoles>
-using PlantEso = LinearEso<Parts.order, S, LinearPlantModel<States, Parts, S>::extension, Placement,
-                           LinearPlantModel<States, Parts, S>>;
+using PlantEso = ModelEso<detail::of_plant(Parts, States), S, Placement>;
 
 /// CascadeEso with the same model.
 template <int States, ModelParts Parts, int Levels, Scalar S = double, class Placement = EqualPoles>
-using PlantCascadeEso =
-    CascadeEso<Parts.order, Levels, S, LinearPlantModel<States, Parts, S>::extension, Placement,
-               LinearPlantModel<States, Parts, S>>;
+using PlantCascadeEso = ModelCascadeEso<detail::of_plant(Parts, States), Levels, S, Placement>;
 
-/// The parts of a disturbance at the present time, each in the unit of d: that of y^(n), or for a
-/// LinearPlantModel the one defined by E.
+/// The parts of a disturbance at the present time, each in the unit of d: that of y^(n), or with
+/// ModelParts::states the one defined by E.
 template <class Model>
 struct DisturbanceParts {
   using S = std::remove_cvref_t<decltype(std::declval<const Model&>().sample_time())>;  ///< scalar
@@ -96,7 +100,7 @@ template <class Observer>
   } else {
     static_assert(
         requires { observer.observer(); },
-        "esokit: the parts of a disturbance are those of an AugmentedModel or a LinearPlantModel");
+        "esokit: the parts of a disturbance are those of an AugmentedModel");
     return disturbance_parts(observer.observer());
   }
 }

@@ -121,7 +121,8 @@ class ContinuousNonlinearGain {
   /// @param error_scale > 0, unit of y @param gain_min, gain_max limits of k
   ContinuousNonlinearGain(const Vector<S, Size>& linear, const Shape& shape, const S& error_scale,
                           const S& gain_min, const S& gain_max)
-      : linear_(linear), factor_(shape, error_scale, gain_min, gain_max) {}
+      : linear_(linear),
+        factor_{detail::prepared(shape), S(1.0) / error_scale, gain_min, gain_max} {}
 
   /// k(e) l, N x 1, row i in 1/s^(i+1).
   [[nodiscard]] Vector<S, Size> gain(const S&, const S& e) const { return linear_ * factor_(e); }

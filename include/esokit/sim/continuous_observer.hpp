@@ -13,6 +13,7 @@
 #include <esokit/model/scaled_chain.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>
+#include <esokit/sim/continuous_certificate.hpp>
 #include <esokit/sim/continuous_gain_law.hpp>
 #include <limits>
 #include <optional>

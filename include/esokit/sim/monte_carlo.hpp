@@ -35,6 +35,49 @@
 
 namespace esokit::sim {
 
+namespace detail {
+
+/// The results of a batch of runs.
+template <class Time>
+struct RunResults {
+  std::int64_t count;
+  std::vector<double> numbers;  ///< those of run 0, then of run 1, ..
+  std::vector<FailedRun<Time>> failed;
+};
+
+/// Computes a run and stores the results of its lanes; an error if one is not finite. No member, as
+/// the run is the same whatever varies it.
+template <class Time, class Plant, class Control, class... Reduce, class... F>
+Check<Time> drive(const Plant& plant, const Control& controller,
+                  const RunConfig<Plant, Control>& loop, RunResults<Time>& results, std::int64_t at,
+                  int lanes, const Measure<Reduce, F>&... measures) {
+  using S = typename RunTypes<Plant, Control>::S;
+  std::tuple<Meter<S, Reduce, F>...> meters{Meter<S, Reduce, F>(measures)...};
+  const auto end = sim::run(
+      plant, controller, loop, [&](const auto& sample, const Control& now) ESOKIT_INLINE_LAMBDA {
+        std::apply([&](auto&... meter) { (meter.add(sample, now), ...); }, meters);
+      });
+  if (!end) return end.error();
+  constexpr std::size_t count = sizeof...(measures);
+  for (int lane = 0; lane < lanes; ++lane) {
+    double numbers[count + 1];
+    const char* wrong[count + 1];
+    std::size_t i = 0;
+    std::apply(
+        [&](const auto&... meter) {
+          ((numbers[i] = meter.number(lane), wrong[i] = meter.wrong(numbers[i]), ++i), ...);
+        },
+        meters);
+    for (i = 0; i < count; ++i) {
+      if (wrong[i] != nullptr) return Error<Time>{"measure", static_cast<Time>(i), wrong[i]};
+      results.numbers[static_cast<std::size_t>(at + lane) * count + i] = numbers[i];
+    }
+  }
+  return {};
+}
+
+}  // namespace detail
+
 /// Many runs of a loop, see monte_carlo.
 template <SampledPlant P, class C, class Vary = NoVariation>
 requires ControllerOf<C, P>
@@ -257,12 +300,7 @@ class MonteCarlo {
   }
 
  private:
-  /// The results of a batch of runs.
-  struct Results {
-    std::int64_t count;
-    std::vector<double> numbers;  ///< those of run 0, then of run 1, ..
-    std::vector<FailedRun<Time>> failed;
-  };
+  using Results = detail::RunResults<Time>;
 
   /// Runs that a thread computes at once.
   struct Batch {
@@ -488,38 +526,10 @@ class MonteCarlo {
       return;
     }
     auto loop = settings(run, *one);
-    if (const auto ok = drive(one->plant, one->controller, loop, results, at, 1, measures...); !ok)
+    if (const auto ok =
+            detail::drive(one->plant, one->controller, loop, results, at, 1, measures...);
+        !ok)
       results.failed.push_back({run, ok.error()});
-  }
-
-  /// Computes a run and stores the results of its lanes; an error if one is not finite.
-  template <class Plant, class Control, class... Reduce, class... F>
-  Check<Time> drive(const Plant& plant, const Control& controller,
-                    const RunConfig<Plant, Control>& loop, Results& results, std::int64_t at,
-                    int lanes, const Measure<Reduce, F>&... measures) const {
-    using S = typename RunTypes<Plant, Control>::S;
-    std::tuple<detail::Meter<S, Reduce, F>...> meters{detail::Meter<S, Reduce, F>(measures)...};
-    const auto end = sim::run(
-        plant, controller, loop, [&](const auto& sample, const Control& now) ESOKIT_INLINE_LAMBDA {
-          std::apply([&](auto&... meter) { (meter.add(sample, now), ...); }, meters);
-        });
-    if (!end) return end.error();
-    constexpr std::size_t count = sizeof...(measures);
-    for (int lane = 0; lane < lanes; ++lane) {
-      double numbers[count + 1];
-      const char* wrong[count + 1];
-      std::size_t i = 0;
-      std::apply(
-          [&](const auto&... meter) {
-            ((numbers[i] = meter.number(lane), wrong[i] = meter.wrong(numbers[i]), ++i), ...);
-          },
-          meters);
-      for (i = 0; i < count; ++i) {
-        if (wrong[i] != nullptr) return Error<Time>{"measure", static_cast<Time>(i), wrong[i]};
-        results.numbers[static_cast<std::size_t>(at + lane) * count + i] = numbers[i];
-      }
-    }
-    return {};
   }
 
   template <int lanes, class... Measures>
@@ -545,7 +555,7 @@ class MonteCarlo {
       }
       if (good) {
         set(loop, from + at, state, noise);
-        good = drive(plants.together(), controllers, loop, results, at, lanes, measures...)
+        good = detail::drive(plants.together(), controllers, loop, results, at, lanes, measures...)
                    .has_value();
       }
       // Repeated one by one to find out which of them failed.

@@ -86,8 +86,8 @@ struct RecordAccess {
       }
       if constexpr (requires { c.gain_; }) take(c.gain_, "law");
       find_settings(core(c.observer()), found);
-    } else if constexpr (requires { c.laws_; }) {
-      for (auto& law : c.laws_) take(law, "gain");
+    } else if constexpr (requires { c.numbers_.laws; }) {
+      for (auto& law : c.numbers_.laws) take(law, "gain");
     }
   }
 
@@ -100,13 +100,14 @@ struct RecordAccess {
     constexpr RunningLaw runs = kind_of<LawOf<Observer>>;
     constexpr int size = Observer::size;
     const auto armed = [](auto& c) {
-      (void)(all(is_finite(c.blind_)) && all(is_finite(c.offset_)) && all(is_finite(c.slope_)));
+      (void)(all(is_finite(c.next_.blind)) && all(is_finite(c.next_.offset)) &&
+             all(is_finite(c.next_.slope)));
       return Numbers{};
     };
     add("control_by", {"y"}, true, [](auto& c, const auto& in) {
       if constexpr (observer_traits<Observer>.gates_outliers) {  // asked before, by the text
         const Number u = c.wanted(in[0]);
-        c.output_ = c.limiter_.clamp(select(c.usable(in[0], u), u, c.blind_));
+        c.output_ = c.limiter_.clamp(select(c.usable(in[0], u), u, c.next_.blind));
         return Numbers{c.output_};
       } else {
         return Numbers{c.control(in[0])};
@@ -135,7 +136,7 @@ struct RecordAccess {
       using O = std::remove_cvref_t<decltype(c.observer_)>;
       typename O::Preview next{};
       for (Number& one : next.offset) one = Number(0.0);
-      next.slope = O::by_rows(O::standing(Number(1.0)));
+      next.slope = O::Numbers::by_rows(O::Numbers::standing(Number(1.0)));
       c.look_ahead();
       c.arm_by(next);
       return armed(c);
@@ -183,11 +184,11 @@ struct RecordAccess {
       });
       add("arm_blanked", {}, false, [](auto& c, const auto&) {
         using C = std::remove_cvref_t<decltype(c)>;
-        c.observer_.laws_[0].age_ = std::uint32_t{0};  // it publishes what it keeps
+        c.observer_.numbers_.laws[0].age_ = std::uint32_t{0};  // it publishes what it keeps
         typename C::Reference::All reference;
         int row = 0;
         for (const Number& one : c.reference_) reference(row++) = one;
-        c.settle_for(c.law_.control(c.observer_.estimate(), reference));
+        c.settle_for(c.set_.law.control(c.observer_.estimate(), reference));
         c.settle_for_blind();
         return Numbers{};
       });
@@ -200,14 +201,14 @@ struct RecordAccess {
     const auto gain_of = [&](auto level, const S&) -> const auto& {
       return gains[std::size_t{level}];
     };
-    typename O::Correction slope{};
+    typename O::Numbers::Correction slope{};
     for (auto& state : slope.states) state.fill(S(0.0));
-    typename O::Correction offset{o.kept_.states};
-    o.correct_by(offset, S(0.0), gain_of);
-    o.correct_by(slope, S(1.0), gain_of);
+    typename O::Numbers::Correction offset{o.numbers_.kept.states};
+    o.numbers_.correct_by(offset, S(0.0), gain_of);
+    o.numbers_.correct_by(slope, S(1.0), gain_of);
     constexpr int last = O::levels - 1;
-    return {O::by_rows(O::template up_to_level<last>(offset.states)),
-            O::by_rows(O::template up_to_level<last>(slope.states))};
+    return {O::Numbers::by_rows(O::Numbers::template up_to_level<last>(offset.states)),
+            O::Numbers::by_rows(O::Numbers::template up_to_level<last>(slope.states))};
   }
   template <class C>
   static unsigned hold_left(const C& c) noexcept {
@@ -224,16 +225,16 @@ struct RecordAccess {
 
   /// The gain laws of all levels.
   template <class O>
-  static auto laws(O& o) noexcept -> decltype((o.laws_)) {
-    return o.laws_;
+  static auto laws(O& o) noexcept -> decltype((o.numbers_.laws)) {
+    return o.numbers_.laws;
   }
   /// A correction with gains from elsewhere, `gains[level][row]`.
   template <class O, class S, class Gains>
   static void correct(O& o, const S& y, const Gains& gains) noexcept {
-    typename O::Correction step{o.kept_.states};
-    const bool fine = o.correct_by(
+    typename O::Numbers::Correction step{o.numbers_.kept.states};
+    const bool fine = o.numbers_.correct_by(
         step, y, [&](auto level, const S&) -> const auto& { return gains[std::size_t{level}]; });
-    if (fine && all(is_finite(o.probe(step.states)))) o.commit(step);
+    if (fine && all(is_finite(o.numbers_.probe(step.states)))) o.numbers_.commit(step);
   }
 
   // ---- Laws that run.
@@ -249,7 +250,7 @@ struct RecordAccess {
     }
   }();
   template <class O>
-  using LawOf = std::remove_cvref_t<decltype(std::declval<O&>().laws_[0])>;
+  using LawOf = std::remove_cvref_t<decltype(std::declval<O&>().numbers_.laws[0])>;
 
   // ---- A known model.
 
@@ -290,15 +291,15 @@ struct RecordAccess {
   static O& at_rest(O& any) noexcept {
     auto& o = core(any);
     using Law = LawOf<std::remove_cvref_t<decltype(o)>>;
-    if constexpr (kind_of<Law> == RunningLaw::schedule) o.laws_[0].settled_ = true;
-    if constexpr (kind_of<Law> == RunningLaw::filter) o.laws_[0].since_ = std::int8_t{9};
+    if constexpr (kind_of<Law> == RunningLaw::schedule) o.numbers_.laws[0].settled_ = true;
+    if constexpr (kind_of<Law> == RunningLaw::filter) o.numbers_.laws[0].since_ = std::int8_t{9};
     return any;
   }
   template <class O>
   static LawNumbers law_numbers(const O& o) noexcept {
     LawNumbers numbers;
     numbers.kind = kind_of<LawOf<O>>;
-    const auto& law = o.laws_[0];
+    const auto& law = o.numbers_.laws[0];
     if constexpr (kind_of<LawOf<O>> == RunningLaw::schedule) {
       numbers.start = law.start_index_;
       numbers.least_age = law.least_age_;
@@ -376,7 +377,7 @@ struct RecordAccess {
   template <class C, class Numbers>
   static auto law_for(C& c, const Numbers& in) noexcept {
     auto& o = c.observer();
-    o.laws_[0].age_ = std::uint32_t{0};  // it publishes what it keeps
+    o.numbers_.laws[0].age_ = std::uint32_t{0};  // it publishes what it keeps
     const auto kept = o.rest_.published;
     std::size_t next = 1;
     for (auto& given : o.rest_.published) given = in[next++];
@@ -498,11 +499,11 @@ struct RecordAccess {
   static auto predicted_y(const O& o, const Numbers& in) noexcept {
     typename O::State x{};
     for (std::size_t i = 0; i < x.size(); ++i) x[i] = in[i];
-    return o.model_.predict(x, o.model_.drive(in[x.size()]))[0];
+    return o.numbers_.model.predict(x, o.numbers_.model.drive(in[x.size()]))[0];
   }
   template <class O, class Numbers>
   static void stand_at(O& o, const Numbers& in) noexcept {
-    auto still = o.kept_.states;
+    auto still = o.numbers_.kept.states;
     std::size_t next = 1;
     for (auto& level : still) {
       for (auto& x : level) x = std::remove_cvref_t<decltype(x)>(0.0);
@@ -513,7 +514,7 @@ struct RecordAccess {
   }
   template <class O, class S>
   static void scale_found(O& o, const S& change) noexcept {
-    auto scaled = o.kept_.states;
+    auto scaled = o.numbers_.kept.states;
     for (auto& level : scaled) level[O::order] = level[O::order] * change;
     (void)o.shift_to(scaled);
   }
@@ -524,7 +525,7 @@ struct RecordAccess {
     if constexpr (model_traits<typename O::PlantModel>.is_chain) {
       return Empty{};
     } else {
-      return o.model_.constant_column();
+      return o.numbers_.model.constant_column();
     }
   }
   /// `shift_load` with it.
@@ -533,8 +534,8 @@ struct RecordAccess {
     if constexpr (std::is_same_v<Column, Empty>) {
       (void)o.shift_load(offset);
     } else {
-      auto next = o.kept_.states;
-      const S scaled = o.model_.scaled_constant(offset);
+      auto next = o.numbers_.kept.states;
+      const S scaled = o.numbers_.model.scaled_constant(offset);
       for (auto& state : next) {
         for (std::size_t i = 0; i < column.size(); ++i) state[i] = state[i] + S(column[i]) * scaled;
       }

@@ -220,14 +220,18 @@ inline void rank(std::vector<TunedDesign>& designs, int order) {
   std::stable_sort(designs.begin(), designs.end(), [&](const TunedDesign& a, const TunedDesign& b) {
     return group(a) != group(b) ? group(a) < group(b) : a.cost < b.cost;
   });
+  // The filter also has a covariance, in memory.
+  const auto effort = [](const TunedDesign& d) {
+    return 2 * d.operations + (d.family == TuneFamily::filter ? 1 : 0);
+  };
   for (std::size_t i = 0; i < designs.size(); ++i) {
     std::size_t best = i;
     for (std::size_t j = i + 1; j < designs.size(); ++j) {
       const TunedDesign& a = designs[best];
       const TunedDesign& b = designs[j];
       if (group(b) != group(designs[i]) || b.cost > 1.01 * designs[i].cost) break;
-      if (b.instructions < a.instructions ||
-          (b.instructions == a.instructions && b.modulus_margin > a.modulus_margin)) {
+      if (effort(b) < effort(a) ||
+          (effort(b) == effort(a) && b.modulus_margin > a.modulus_margin)) {
         best = j;
       }
     }
@@ -251,7 +255,7 @@ std::vector<Contender> contenders(const TuneModel& model, bool law_is_given) {
     c.design.knows = knows;
     c.design.extension = m;
     c.design.levels = p;
-    c.design.instructions = update_instructions(model.order, family, m, p, knows);
+    c.design.operations = update_operations(model.order, m, p, knows);
     c.kind = std::move(*kind);
     if (family == TuneFamily::cascade) c.observer_numbers = 2;
     if (family == TuneFamily::free_poles) {

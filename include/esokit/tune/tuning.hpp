@@ -45,7 +45,7 @@ struct TunedDesign {
   double phase_margin = 0.0;       ///< smallest over the intervals, rad
   double damping_latencies = 0.0;  ///< k_1 / k_0 over TuneModel::latency, 0 if there is no k_1
   double bandwidth_ratio = 0.0;    ///< omega_c / omega_o, geometric means of poles
-  int instructions = 0;            ///< per update of the observer, see update_instructions
+  int operations = 0;              ///< per update of the observer, see update_operations
   std::string code;                ///< C++ source of the controller, type and config, to paste
   LinearController controller{};   ///< for the analysis, see closed_loop(model, controller)
   PlayedLaw law{};                 ///< what softening has to know, see `played_law`
@@ -133,23 +133,21 @@ inline std::vector<TuneAlarm> alarms(const Tuning& tuning, const TunedDesign& de
   return all;
 }
 
-/// Instructions of an update of the observer on a Cortex-M4F in float, counted in the disassembly
-/// on the path without faults (GCC 12, -O2). The emulator of examples/embedded counts the same
-/// within two; its table gives the frozen filter nine more.
-inline int update_instructions(int order, TuneFamily family, int extension, int levels,
-                               const TuneKnowledge& knows) {
+/// Operations of an update of the observer: additions, products, comparisons and the like in its
+/// recorded list, of which the C of `target` consists. A test compares the two.
+inline int update_operations(int order, int extension, int levels, const TuneKnowledge& knows) {
   const auto n = static_cast<std::size_t>(order - 1);
-  constexpr int chain[3][2] = {{27, 39}, {39, 50}, {50, 63}};
-  constexpr int cascade[3][2] = {{43, 57}, {58, 83}, {76, 115}};
-  constexpr int lag[3] = {45, 61, 80}, sensor[3] = {41, 56, 75}, sinusoid[3] = {57, 74, 92};
-  constexpr int lag_sensor[3] = {63, 82, 102}, lag_sinusoid[3] = {80, 103, 124};
+  constexpr int chain[4] = {13, 21, 30, 41};
+  constexpr int cascade[3][2] = {{26, 37}, {42, 60}, {60, 86}};
+  constexpr int lag[3] = {24, 34, 45}, sensor[3] = {23, 33, 44}, sinusoid[3] = {35, 47, 60};
+  constexpr int lag_sensor[3] = {36, 48, 61}, lag_sinusoid[3] = {52, 66, 81};
   if (knows.lag && knows.sensor) return lag_sensor[n];
   if (knows.lag && knows.sinusoid) return lag_sinusoid[n];
   if (knows.lag) return lag[n];
   if (knows.sensor) return sensor[n];
   if (knows.sinusoid) return sinusoid[n];
   if (levels > 1) return cascade[n][static_cast<std::size_t>(levels - 2)];
-  return chain[n][static_cast<std::size_t>(extension - 1)] + (family == TuneFamily::filter ? 9 : 0);
+  return chain[n + static_cast<std::size_t>(extension - 1)];
 }
 
 }  // namespace esokit
