@@ -67,6 +67,29 @@ TEST(Expected, MovesWhatCannotBeCopied) {
   Expected<std::unique_ptr<int>, Error<double>> again = std::make_unique<int>(8);
   const std::unique_ptr<int> dereferenced = *std::move(again);
   EXPECT_EQ(*dereferenced, 8);
+  // What is copied as bytes, but only by a move; and an error.
+  struct Handle {
+    explicit Handle(int given) : number(given) {}
+    Handle(Handle&&) = default;
+    Handle& operator=(Handle&&) = default;
+    int number;
+  };
+  static_assert(std::is_trivially_copyable_v<Handle>);
+  Expected<Handle, Error<double>> handle = Handle(9);
+  handle = Handle(10);
+  EXPECT_EQ(std::move(handle).value().number, 10);
+  const Expected<void, std::unique_ptr<int>> reason = std::make_unique<int>(11);
+  EXPECT_EQ(*reason.error(), 11);
+}
+
+TEST(Expected, IsAssignedTheOtherKind) {
+  Expected<int, Error<double>> number = 5;
+  Expected<int, Error<double>> other = refused;
+  std::swap(number, other);
+  EXPECT_STREQ(number.error().field, "input_gain");
+  EXPECT_EQ(*other, 5);
+  number = other;
+  EXPECT_EQ(*number, 5);
 }
 
 TEST(Expected, OfNothing) {
@@ -94,6 +117,28 @@ TEST(ExpectedDeathTest, ValueOfAnErrorSaysWhichAndEndsTheProgram) {
 TEST(ExpectedDeathTest, ErrorOfAValueEndsTheProgram) {
   EXPECT_DEATH((void)Result(std::string("good")).error(), "");
   EXPECT_DEATH((void)Outcome().error(), "");
+}
+
+/// Its move throws.
+struct Thrown {
+  explicit Thrown(int) {}
+  Thrown(Thrown&&) { throw 1; }
+  Thrown& operator=(Thrown&&) { throw 1; }
+  Thrown(const Thrown&) {}
+  Thrown& operator=(const Thrown&) { return *this; }
+};
+
+TEST(ExpectedDeathTest, ErrorAfterAnAssignmentThatThrewEndsTheProgram) {
+  const Thrown given(0);
+  Expected<Thrown, Error<double>> result = refused;
+  const Expected<Thrown, Error<double>> value = given;
+  try {
+    result = Expected<Thrown, Error<double>>(value);
+  } catch (int) {
+  }
+  EXPECT_FALSE(result.has_value());
+  EXPECT_DEATH((void)result.error(), "");
+  EXPECT_DEATH((void)result.value(), "");
 }
 
 TEST(Expected, IsUsableAtCompileTime) {

@@ -21,17 +21,22 @@ template <class T, class E>
 struct Either {
   constexpr explicit Either(const T& value) : content(std::in_place_index<0>, value) {}
   constexpr explicit Either(T&& value) : content(std::in_place_index<0>, std::move(value)) {}
-  constexpr Either(ErrorOf, const E& error) : content(std::in_place_index<1>, error) {}
+  constexpr Either(ErrorOf, E error) : content(std::in_place_index<1>, std::move(error)) {}
   [[nodiscard]] constexpr bool has_value() const noexcept { return content.index() == 0; }
   [[nodiscard]] constexpr T* value() noexcept { return std::get_if<0>(&content); }
   [[nodiscard]] constexpr const T* value() const noexcept { return std::get_if<0>(&content); }
-  [[nodiscard]] constexpr const E* error() const noexcept { return std::get_if<1>(&content); }
+  [[nodiscard]] constexpr const E* error() const noexcept {
+    // Neither of both, after an assignment that threw.
+    if (content.valueless_by_exception()) std::abort();
+    return std::get_if<1>(&content);
+  }
   std::variant<T, E> content;
 };
 template <class T, class E>
 requires(std::is_trivially_copyable_v<T>&& std::is_trivially_copyable_v<E>) struct Either<T, E> {
   constexpr explicit Either(const T& given) : one(given), good(true) {}
-  constexpr Either(ErrorOf, const E& given) : other(given), good(false) {}
+  constexpr explicit Either(T&& given) : one(std::move(given)), good(true) {}
+  constexpr Either(ErrorOf, E given) : other(std::move(given)), good(false) {}
   [[nodiscard]] constexpr bool has_value() const noexcept { return good; }
   [[nodiscard]] constexpr T* value() noexcept { return &one; }
   [[nodiscard]] constexpr const T* value() const noexcept { return &one; }
@@ -123,7 +128,7 @@ class [[nodiscard]] Expected<void, E> {
   /// Success.
   constexpr Expected() noexcept : content_(detail::Success{}) {}
   /// Implicit, so that `return error;` compiles.
-  constexpr Expected(E error) : content_(detail::ErrorOf{}, error) {}
+  constexpr Expected(E error) : content_(detail::ErrorOf{}, std::move(error)) {}
 
   /// True for success, false if there is an error.
   /// @{
