@@ -1,7 +1,8 @@
-# Files that are one translation unit and one program with ESOKIT_TESTS_TOGETHER, a program a line. Those
-# that instantiate the same types sit together (chosen by the code that their programs had in common), as
-# many as GCC compiles within some 1.5 GB. Of one line: either law suites, or tests that count allocations
-# (support/no_allocation.hpp, which replaces operator new), or neither. A file in no line is by itself.
+# Files that are one translation unit and one program with ESOKIT_TESTS_TOGETHER: a program a line, called
+# by its first file. Those that instantiate the same types sit together (chosen by the code that their
+# programs had in common), as many as GCC compiles within some 1.5 GB. Of one line: either law suites, or
+# tests that count allocations (support/no_allocation.hpp, which replaces operator new), or neither. A file
+# in no line is by itself.
 set(esokit_units
     "adapter/decorators adapter/outlier_gate"
     "adapter/guarded adapter/guarded_model adapter/measured"
@@ -23,12 +24,10 @@ set(esokit_units
     "observer/absurd_numbers observer/adjustable_bandwidth_eso observer/given_values observer/reconvergence"
     "observer/algebraic_eso observer/cascade_identities observer/observer_static observer/predictor_corrector observer/random_config observer/refused_config"
     "observer/archetype_scalars observer/concepts_static observer/model_seam"
-    "observer/extended_state_filter observer/mimo_extended_state_filter"
-    "observer/model_cascade observer/model_eso"
     "observer/named_observer observer/nonlinear_eso observer/pack"
     "observer/adjustable_bandwidth_eso_laws observer/cascade_eso_laws observer/half_gain_eso_laws observer/linear_eso_laws observer/own_observer_laws observer/pole_set_laws"
     "observer/algebraic_eso_laws observer/extended_state_filter_laws observer/model_eso_laws observer/model_parts_laws observer/nonlinear_eso_laws"
     "sim/closed_loop sim/dormand_prince sim/metrics sim/noise sim/plant sim/refused_config sim/runge_kutta sim/signals"
     "sim/counted_gaussian sim/run sim/study_records"
     "target/health_code target/profile_code"
-    "tune/pid_conversion tune/tune")
+    "tune/pid_conversion tune/tune tune/update_operations")

@@ -106,7 +106,7 @@ class Erased final : public AnyObserver {
   explicit Erased(const O& o) : o_(o) {}
 
   [[nodiscard]] std::unique_ptr<AnyObserver> copy() const override {
-    return std::make_unique<Erased>(*this);
+    return std::unique_ptr<AnyObserver>(new Erased(*this));
   }
   StepStatus update(double y, double u) override { return o_.update(s(y), s(u)); }
   StepStatus predict(double u) override { return o_.predict(s(u)); }
@@ -203,7 +203,7 @@ Type type_of() {
 }
 ,
     .bare = [](double omega_T) -> std::unique_ptr<AnyObserver> {
-      return std::make_unique<Erased<O>>(O::make(settings<O>(omega_T)).value());
+      return std::unique_ptr<AnyObserver>(new Erased<O>(O::make(settings<O>(omega_T)).value()));
     },
     .guarded = [](const Settings& c) -> std::unique_ptr<AnyObserver> {
       const typename Guarded<O>::Config config{
@@ -212,7 +212,7 @@ Type type_of() {
           .unit = c.unit,
           .release_samples = c.release_samples,
           .leak_time = static_cast<S>(c.leak_time)};
-      return std::make_unique<Erased<Guarded<O>>>(Guarded<O>::make(config).value());
+      return std::unique_ptr<AnyObserver>(new Erased<Guarded<O>>(Guarded<O>::make(config).value()));
     }
 };  // namespace esokit_test::guards
 }

@@ -93,7 +93,7 @@ class ErasedController<Adrc<O, F>> final : public AnyController {
   explicit ErasedController(const Controller& c) : c_(c) {}
 
   [[nodiscard]] std::unique_ptr<AnyController> copy() const override {
-    return std::make_unique<ErasedController>(*this);
+    return std::unique_ptr<AnyController>(new ErasedController(*this));
   }
   double update(double y, double r) override { return d(c_.update(s(y), s(r))); }
   void applied(double u) override { c_.applied(s(u)); }
@@ -128,7 +128,8 @@ class ErasedController<Adrc<O, F>> final : public AnyController {
     type.approximate = requires { LoopTraits<O>::approximate; };
     type.bears_regular_gaps = esokit::observer_traits<O>.bears_regular_gaps;
     type.make = [](const LoopSetup& setup) -> std::unique_ptr<AnyController> {
-      return std::make_unique<ErasedController>(Controller::make(config(setup)).value());
+      return std::unique_ptr<AnyController>(
+          new ErasedController(Controller::make(config(setup)).value()));
     };
     type.refusal_of = [](const LoopSetup& setup) {
       return refusal(Controller::make(config(setup)));

@@ -73,7 +73,7 @@ class Erased final : public AnyLoop {
                      .value()) {}
 
   [[nodiscard]] std::unique_ptr<AnyLoop> copy() const override {
-    return std::make_unique<Erased>(*this);
+    return std::unique_ptr<AnyLoop>(new Erased(*this));  // make_unique is dear for each type
   }
   double update(double y, double r) override {
     // A compensator helps a controller of the user.

@@ -168,7 +168,7 @@ void each_is_back_at_the_reference() {
   const auto one = []<class C>(LoopOf<C>*) {
     SCOPED_TRACE(testing::internal::GetTypeName<C>());
     back_at_the_reference([](double omega_T) -> std::unique_ptr<Loop> {
-      return std::make_unique<LoopOf<C>>(omega_T);
+      return std::unique_ptr<Loop>(new LoopOf<C>(omega_T));
     });
   };
   (one(static_cast<LoopOf<Controllers>*>(nullptr)), ...);

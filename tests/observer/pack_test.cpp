@@ -527,8 +527,10 @@ Case case_of() {
   return {lane_count<S>, std::is_same_v<One, float>, esokit::observer_traits<Plain>.gates_outliers,
           requires(Plain o){o.update_weighted(One(0), One(0), One(1));
 }
-, []() -> std::unique_ptr<Subject> { return std::make_unique<Of<Kind, S>>(0); },
-    [](int lane) -> std::unique_ptr<Subject> { return std::make_unique<Of<Kind, One>>(lane); }
+, []() -> std::unique_ptr<Subject> { return std::unique_ptr<Subject>(new Of<Kind, S>(0)); },
+    [](int lane) -> std::unique_ptr<Subject> {
+      return std::unique_ptr<Subject>(new Of<Kind, One>(lane));
+    }
 };  // namespace observer_pack_test
 }  // namespace esokit_test
 

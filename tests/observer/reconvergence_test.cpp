@@ -220,7 +220,9 @@ struct Kind {
 template <class Observer>
 Kind kind_of() {
   using Limits = std::numeric_limits<typename Observer::scalar_type>;
-  return {[](double x) -> std::unique_ptr<Calls> { return std::make_unique<Of<Observer>>(x); },
+  return {[](double x) -> std::unique_ptr<Calls> {
+            return std::unique_ptr<Calls>(new Of<Observer>(x));
+          },
           Observer::order, Observer::size, static_cast<double>((Limits::max)()),
           static_cast<double>(Limits::epsilon()),
           requires(const Observer& o){o.wrap(typename Observer::scalar_type(1));

@@ -94,29 +94,8 @@ TEST(CCode, ByClang) {
 /// Whatever the compiler may assume of numbers, bad ones never get into the state.
 TEST(CCode, RefusesBadNumbersUnderFastMath) {
   if (!there("gcc")) GTEST_SKIP() << "no gcc";
-  const auto refuses = [&](auto v) {
-    using V = decltype(v);
-    using C = Adrc<LinearEso<2, V>>;
-    const Folder folder;
-    InC<V> in_c(folder, to_c(C::make(config<C>(8)).value(), {.name = "loop"}).value(), true,
-                "gcc -std=gnu99 -ffast-math -Wno-error");
-    ASSERT_TRUE(in_c.loaded());
-    EXPECT_EQ(in_c.self_test(V(1e-3)), 0);
-    for (const V bad : {hidden_nan<V>(), hidden_infinity<V>(), -hidden_infinity<V>()}) {
-      for (int k = 0; k < 20; ++k) EXPECT_EQ(is_finite(in_c.update(V(0.1), V(0.2))), true);
-      EXPECT_EQ(in_c.probe() % 256, 0u);
-      EXPECT_TRUE(is_finite(in_c.update(bad, V(0.2))));
-      EXPECT_EQ(in_c.probe() % 256, 1u) << "measurement_rejected";
-      EXPECT_TRUE(is_finite(in_c.update(V(0.1), bad)));
-      in_c.applied(bad);
-      EXPECT_TRUE(is_finite(in_c.update(V(0.1), V(0.2))));
-      EXPECT_NE(in_c.start(bad, V(0)), 0u);
-      EXPECT_NE(in_c.start(V(0), bad), 0u);
-      for (unsigned row = 0; row < 3; ++row) EXPECT_TRUE(is_finite(in_c.estimate(row)));
-    }
-  };
-  refuses(float{});
-  refuses(double{});
+  refuses_under_fast_math<Adrc<LinearEso<2, float>>>(true);
+  refuses_under_fast_math<Adrc<LinearEso<2, double>>>(true);
 }
 
 /// What else has to take it: an old C++, Clang, small compilers, and that of a microcontroller; and

@@ -81,6 +81,7 @@ class DelayedInput : public NamedAdapter<DelayedInput<Observer, Capacity>, Obser
  private:
   friend struct detail::RecordAccess;
   static constexpr int length = Capacity + 1;
+  static constexpr bool advances = detail::LaneAccess::advances<Observer>;
 
   DelayedInput(const Observer& observer, const DelayedInputConfig<Observer>& config) noexcept
       : Base(observer) {

@@ -268,6 +268,7 @@ class Adrc {
   friend struct detail::LaneAccess;
   friend struct detail::RecordAccess;
   static constexpr int data_members = 5;
+  static constexpr bool advances = detail::LaneAccess::advances<Observer>;
 
   using Loop = ControlLoop<Observer>;
   using Law = AdrcLaw<order, S>;
@@ -297,7 +298,7 @@ class Adrc {
 
   Adrc(const Loop& loop, const Law& law, const Weights& weights, const Soft& soft,
        const Config& config) noexcept
-      : loop_(loop), law_(law), weights_(weights), soft_(soft), spec_(spec(config)) {}
+      : loop_(loop), weights_(weights), law_(law), soft_(soft), spec_(spec(config)) {}
 
   static FeedbackSpec<S> spec(const Config& config) noexcept {
     return {config.controller_bandwidth, config.domain, config.half_gain};
@@ -448,8 +449,8 @@ class Adrc {
   }
 
   Loop loop_;
-  Law law_;
   [[no_unique_address]] Weights weights_;
+  Law law_;
   Soft soft_;
   [[no_unique_address]] std::conditional_t<has_step_time, FeedbackSpec<S>, NoSpec> spec_;
 };

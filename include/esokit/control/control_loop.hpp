@@ -332,6 +332,7 @@ class ControlLoop {
               std::uint32_t hold_samples, bool watched) noexcept
       : observer_(observer),
         limiter_(limiter),
+        hold_left_(hold_samples),
         set_{settings.start_hold.input,
              settings.missing.input.value_or(S(0)),
              static_cast<std::uint16_t>((settings.missing.most + 1) * settings.measurement_divider),
@@ -340,7 +341,6 @@ class ControlLoop {
              settings.missing.input.has_value(),
              settings.missing.stay,
              decltype(Set::limits)(settings.limits)},
-        hold_left_(hold_samples),
         mode_(hold_samples > 0 ? LoopMode::start_hold : LoopMode::running) {
     set_mode(mode_);
     // The output before the first step is the hold input, or the value nearest to it within the
@@ -432,16 +432,17 @@ class ControlLoop {
     return static_cast<std::uint16_t>(phase_ + 1 == set_.divider ? 0 : phase_ + 1);
   }
 
+  // What a good sample touches comes first: packs of it are read from memory as one block.
   Observer observer_;
   Limiter<S> limiter_;
   S requested_{};
-  [[no_unique_address]] Set set_;  // its padding holds what is next
   Status status_ = StepStatus::ok;
-  Lanes<std::uint32_t, S> hold_left_;
-  Lanes<std::uint16_t, S> phase_{};
-  Lanes<LoopMode, S> mode_;
   /// True if anything besides the law has to be done: one test in the hot path.
   Lanes<bool, S> special_{false};
+  Lanes<std::uint16_t, S> phase_{};
+  Lanes<std::uint32_t, S> hold_left_;
+  [[no_unique_address]] Set set_;  // its padding holds what is next
+  Lanes<LoopMode, S> mode_;
 };
 
 }  // namespace esokit

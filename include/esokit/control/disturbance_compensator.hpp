@@ -184,6 +184,7 @@ class DisturbanceCompensator {
   friend struct detail::LaneAccess;
   friend struct detail::RecordAccess;
   static constexpr int data_members = 2;
+  static constexpr bool advances = detail::LaneAccess::advances<Observer>;
 
   using Loop = ControlLoop<Observer>;
 

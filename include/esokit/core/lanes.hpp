@@ -133,6 +133,15 @@ struct LaneAccess {
   static constexpr bool steps = requires(Object& object) {
     object.advance();
   };
+  /// Whether `advance` changes something: if not, `update_advanced` is `update`.
+  template <class Object>
+  static constexpr bool advances = [] {
+    if constexpr (requires { Object::advances; }) {
+      return Object::advances;
+    } else {
+      return true;
+    }
+  }();
   /// function(all data members).
   template <class Object, class Function>
   ESOKIT_INLINE static constexpr auto with_members(Object& object, const Function& function) {

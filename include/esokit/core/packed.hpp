@@ -297,8 +297,12 @@ class Packed : public detail::PackedTraits<
       if (advanced && Access::predict_all(form_, given...)) [[likely]]
         return Result{};
       return each([&](T& lane, int i) {
-        return advanced ? Access::predict_advanced(lane, detail::lane_of<scalar_type>(given, i)...)
-                        : lane.predict(detail::lane_of<scalar_type>(given, i)...);
+        if constexpr (Access::advances<T>) {
+          if (advanced) {
+            return Access::predict_advanced(lane, detail::lane_of<scalar_type>(given, i)...);
+          }
+        }
+        return lane.predict(detail::lane_of<scalar_type>(given, i)...);
       });
     } else {
       return each(
@@ -395,10 +399,14 @@ class Packed : public detail::PackedTraits<
   using ResultOf = typename detail::OfPacks<Result, scalar_type>::type;
 
   template <class... Given>
-  ESOKIT_COLD auto update_lanes(bool advanced, const Given&... given) noexcept {
+  ESOKIT_COLD auto update_lanes([[maybe_unused]] bool advanced, const Given&... given) noexcept {
     return each([&](T& lane, int i) {
-      return advanced ? Access::update_advanced(lane, detail::lane_of<scalar_type>(given, i)...)
-                      : lane.update(detail::lane_of<scalar_type>(given, i)...);
+      if constexpr (Access::advances<T>) {
+        if (advanced) {
+          return Access::update_advanced(lane, detail::lane_of<scalar_type>(given, i)...);
+        }
+      }
+      return lane.update(detail::lane_of<scalar_type>(given, i)...);
     });
   }
 

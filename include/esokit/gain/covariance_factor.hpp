@@ -48,9 +48,8 @@ struct MatrixTransition {
   /// Phi of a model.
   template <class Model>
   static MatrixTransition of(const Model& model) noexcept {
-    MatrixTransition transition{model.increment(), {}};
+    MatrixTransition transition{model.increment() + Matrix<S, Size, Size>::Identity(), {}};
     for (int i = 0; i < Size; ++i) {
-      transition.phi(i, i) = transition.phi(i, i) + S(1.0);
       transition.degrees[static_cast<std::size_t>(i)] = model.degree(i);
     }
     return transition;
@@ -59,9 +58,7 @@ struct MatrixTransition {
   /// Members of a model, see SampledModel.
   /// @{
   [[nodiscard]] Matrix<S, Size, Size> increment() const noexcept {
-    Matrix<S, Size, Size> step = phi;
-    for (int i = 0; i < Size; ++i) step(i, i) = step(i, i) - S(1.0);
-    return step;
+    return phi - Matrix<S, Size, Size>::Identity();
   }
   [[nodiscard]] int degree(int row) const noexcept {
     return degrees[static_cast<std::size_t>(row)];

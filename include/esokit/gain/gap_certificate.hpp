@@ -34,8 +34,7 @@ class FallingSquare {
     square.margin_ = S(0.1) * -expm1(S(-decay));
     // A / sqrt(rho), without I.
     const S more = expm1(S(S(0.5) * decay));
-    Square discounted = step + step * more;
-    for (int i = 0; i < Size; ++i) discounted(i, i) = discounted(i, i) + more;
+    Square discounted = step + step * more + Square::Identity() * more;
     square.p_ = spread;
     Array<S, 2 * Size * Size> work;
     if (!sum_by_doubling(discounted.data(), square.p_.data(), work.data(),

@@ -152,7 +152,7 @@ struct MimoRiccati : ChainRows<Orders, Extension> {
         for (int l = 0; l <= i; ++l) explained += apart(i, l) * of_apart(first(l), j);
         for (int r = 0; r < size; ++r) of_apart(r, j) -= k[index(r)] * explained;
       }
-      for (int r = 0; r < size; ++r) of_apart(r, i) = k[index(r)];
+      set_block(of_apart, 0, i, column(k));
     }
     gain = of_apart * apart;
   }
@@ -238,7 +238,7 @@ struct MimoRiccati : ChainRows<Orders, Extension> {
     unroll<outputs>([&](auto chain) {
       constexpr int length = Orders::values[chain] + Extension;
       const auto k = current_gain<length, S>(EqualSampledPoles<length, S>{S(1)}.weights());
-      for (int r = 0; r < length; ++r) first_gain(first(chain) + r, int{chain}) = k[index(r)];
+      set_block(first_gain, first(chain), int{chain}, column(k));
     });
     const auto covariance = riccati_covariance<size, outputs, S>(model, first_gain);
     if (!covariance) return false;

@@ -93,7 +93,7 @@ struct PartDesign {
     for (; all(largest_magnitude(a) < S(0.25)) && all(share > S(1e-12)); share = share * S(0.5)) {
       a = joined(a, a);
     }
-    for (int i = 0; i < Size; ++i) a(i, i) = a(i, i) + S(1.0);
+    a += Square::Identity();
     S radius(0.0);
     for (int squaring = 0; squaring < 40; ++squaring) {
       const S size = largest_magnitude(a);
@@ -125,8 +125,7 @@ struct PartDesign {
     // does not move, as a lag that is only computed, has an error all the same.
     constexpr int rounds = 8;
     for (const double share : {1.0, 0.2}) {
-      Square spread = column(gain) * column(gain).transpose();
-      for (int i = 0; i < Size; ++i) spread(i, i) = spread(i, i) + least;
+      Square spread = column(gain) * column(gain).transpose() + Square::Identity() * least;
       for (int round = 0; round < rounds && longest_step < Longest; ++round) {
         const S rate = S(share) * decay;
         const auto square = FallingSquare<Size, S>::make(sample, spread, rate);
@@ -151,7 +150,7 @@ struct PartDesign {
       Square middle = over;
       for (int samples = first; samples <= (first + next - 1) / 2; ++samples)
         middle = joined(middle, step);
-      const Square phi = plus_identity(middle);
+      const Square phi = middle + Square::Identity();
       const Square grown = phi * square.covariance() * phi.transpose();
       auto& gain = found[static_cast<std::size_t>(i)];
       // R is halved until V falls in all steps with this gain; at R = 0 it may rise, too.
@@ -179,14 +178,9 @@ struct PartDesign {
         longest_step = samples - 1;
         gains = found;
       }
-      if (samples < next) return plus_identity(error);
+      if (samples < next) return error + Square::Identity();
     }
     return error;
-  }
-
-  static Square plus_identity(Square a) {
-    for (int i = 0; i < Size; ++i) a(i, i) = a(i, i) + S(1.0);
-    return a;
   }
 };
 

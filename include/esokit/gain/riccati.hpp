@@ -113,11 +113,8 @@ ScaledGain<Size, S> deadbeat_gain(const PascalTransition&) {
 }
 template <int Size, Scalar S>
 ScaledGain<Size, S> deadbeat_gain(const MatrixTransition<Size, S>& transition) {
-  Array<S, Size> output{};
-  output.fill(S(0.0));
-  output[0] = S(1.0);
-  return placed_gain(transition.increment(), output, transition.degrees,
-                     pole_factors(EqualSampledPoles<Size, S>{S(1.0)}));
+  return placed_gain(transition.increment(), elements(Matrix<S, Size, Size>::Identity().col(0)),
+                     transition.degrees, pole_factors(EqualSampledPoles<Size, S>{S(1.0)}));
 }
 
 /// C (-I - Phi)^-1; Phi of the chain is upper triangular.
@@ -137,16 +134,8 @@ Array<S, Size> alternating_response(const PascalTransition&) {
 }
 template <int Size, Scalar S>
 Array<S, Size> alternating_response(const MatrixTransition<Size, S>& transition) {
-  Matrix<S, Size, Size> system;  // (-I - Phi)'
-  Array<S, Size> response{};
-  for (int i = 0; i < Size; ++i) {
-    response[static_cast<std::size_t>(i)] = S(i == 0 ? 1.0 : 0.0);
-    for (int j = 0; j < Size; ++j) {
-      system(i, j) = -transition.phi(j, i) - S(i == j ? 1.0 : 0.0);
-    }
-  }
-  solve_in_place(DenseView<S>{system.data(), Size}, DenseView<S>{response.data(), Size, 1});
-  return response;
+  const auto identity = Matrix<S, Size, Size>::Identity();
+  return elements(solved(-transition.phi.transpose() - identity, identity.col(0)));
 }
 
 }  // namespace detail

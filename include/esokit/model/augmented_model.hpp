@@ -47,6 +47,11 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   static constexpr int la = Parts.actuator;
   static constexpr int lf = Parts.sensor;
   static constexpr int m = Parts.constants;
+  static_assert(n >= 1, "esokit: the plant order must be at least 1");
+  static_assert(m >= 1, "esokit: at least one extended state is needed");
+  static_assert(la >= 0 && la <= 2 && lf >= 0 && lf <= 2, "esokit: a lag has order 0, 1 or 2");
+  static_assert(Parts.resonators >= 0 && Parts.first_order >= 0,
+                "esokit: the number of parts must not be negative");
   static_assert(Parts.states == 0, "esokit: a whole plant needs model/plant_model.hpp");
 
  public:
@@ -181,10 +186,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   }
   /// The constant part of d, unit of y^(n): D without the plant, the actuator and the other parts.
   [[nodiscard]] S constant(const Estimate& z) const noexcept {
-    const auto x = this->scaled(z);
-    const auto row = constant_row();
-    S sum(0);
-    for (std::size_t j = 0; j < row.size(); ++j) sum = sum + row[j] * x[j];
+    S sum = detail::column(constant_row()).dot(detail::column(this->scaled(z)));
     for (int j = n; j > 0; --j) sum = sum * (static_cast<S>(j) * rate_);
     return sum;
   }
@@ -210,10 +212,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   }
   /// The change of the states x per unit of this constant, with all other natural states kept.
   [[nodiscard]] State constant_column() const noexcept {
-    const auto part = corrected_part<without(true, false)>();
-    State column{};
-    for (int i = 0; i < size; ++i) column[static_cast<std::size_t>(i)] = part.whole(i, lf + n);
-    return column;
+    return detail::elements(corrected_part<without(true, false)>().whole.col(lf + n));
   }
   /// The rows by which the states x give the contribution of the actuator's output to the states
   /// y^(n) .. D.
@@ -225,17 +224,13 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
     // The states of the part are those of the model, except this one, which follows from the
     // constant.
     auto natural = Matrix<S, part_size, size>::Zero();
-    const State row = constant_row();
-    for (int j = 0; j < size; ++j) natural(acted_on, j) = row[static_cast<std::size_t>(j)];
+    const auto row = detail::column(constant_row());
+    detail::set_block(natural, acted_on, 0, row.transpose());
     for (int k = 0; k < part_size; ++k) {
       if (k == acted_on) continue;
       const int state = part.states[static_cast<std::size_t>(k)];
       natural(k, state) = S(1);
-      S weight(0);
-      for (int i = 0; i < size; ++i) {
-        weight = weight + row[static_cast<std::size_t>(i)] * part.whole(i, k);
-      }
-      natural(acted_on, state) = natural(acted_on, state) - weight;
+      natural(acted_on, state) = natural(acted_on, state) - row.dot(part.whole.col(k));
     }
     Matrix<S, la + 1, size> rows;
     for (int i = 0; i <= la; ++i) {

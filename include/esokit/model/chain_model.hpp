@@ -13,17 +13,21 @@ namespace esokit {
 ///
 /// States are those of ScaledChain.
 template <int Order, Scalar S = double, int Extension = 1>
-class ChainModel : public ScaledChain<Order, S, Extension> {
+class ChainModel {
   using Chain = ScaledChain<Order, S, Extension>;
   static constexpr int N = Order + Extension;
 
  public:
+  static constexpr int order = Order;          ///< n, order of the plant
+  static constexpr int extension = Extension;  ///< m, extended states
+  static constexpr int size = N;               ///< N = n + m
+
   static constexpr ModelTraits traits{
       .is_chain = true, .shifts_output = true, .adds_levels = true};  ///< what it is
   using Settings = NoModelSettings;                                   ///< settings of make
 
-  using typename Chain::Estimate;
-  using typename Chain::State;
+  using State = Array<S, N>;      ///< x, scaled, N elements
+  using Estimate = Vector<S, N>;  ///< z, physical units, N x 1
   template <class T>
   using with_scalar = ChainModel<Order, T, Extension>;  ///< the same with another scalar
 

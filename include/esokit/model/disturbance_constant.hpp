@@ -5,6 +5,7 @@
 #include <esokit/core/kernels.hpp>
 #include <esokit/core/scalar.hpp>
 #include <esokit/core/unroll.hpp>
+#include <esokit/math/dense.hpp>
 #include <esokit/model/sampled_model.hpp>
 #include <limits>
 #include <utility>
@@ -150,13 +151,10 @@ requires(model_traits<Model>.tells_constant) struct DisturbanceConstant<Model, S
   }
   /// Adds `share` of what the actuator's output contributes to the state `from`.
   void add_output(State& x, const State& from, const S& share) const noexcept {
+    const auto output = actuator * detail::column(from);
     for (int i = 0; i <= lag; ++i) {
-      S sum(0);
-      for (int j = 0; j < Model::size; ++j) {
-        sum = sum + actuator(i, j) * from[static_cast<std::size_t>(j)];
-      }
       S& state = x[static_cast<std::size_t>(driven + i)];
-      state = state + share * sum;
+      state = state + share * output(i);
     }
   }
 };

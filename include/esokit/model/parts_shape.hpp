@@ -44,14 +44,6 @@ namespace detail {
 /// such remaining states, D takes the place of the first state of the disturbance.
 template <ModelParts Parts>
 struct PartsShape {
-  static_assert(Parts.order >= 1, "esokit: the plant order must be at least 1");
-  static_assert(Parts.constants >= 1, "esokit: at least one extended state is needed");
-  static_assert(Parts.actuator >= 0 && Parts.actuator <= 2 && Parts.sensor >= 0 &&
-                    Parts.sensor <= 2,
-                "esokit: a lag has order 0, 1 or 2");
-  static_assert(Parts.resonators >= 0 && Parts.first_order >= 0,
-                "esokit: the number of parts must not be negative");
-
   static constexpr ModelParts parts = Parts;
   /// The order that a control law sees: that of the plant plus that of the actuator's lag.
   static constexpr int order = Parts.order + Parts.actuator;

@@ -39,7 +39,11 @@ requires(Parts.states > 0)  //
   static constexpr int n = Parts.order;
   static constexpr int lf = Parts.sensor;
   static constexpr int inner = Base::size - lf;  ///< states without the sensor's
-  static_assert(n <= States, "esokit: the relative degree is 1 .. States");
+  static_assert(Parts.constants >= 1, "esokit: at least one extended state is needed");
+  static_assert(lf >= 0 && lf <= 2, "esokit: a lag has order 0, 1 or 2");
+  static_assert(Parts.resonators >= 0 && Parts.first_order >= 0,
+                "esokit: the number of parts must not be negative");
+  static_assert(n >= 1 && n <= States, "esokit: the relative degree is 1 .. States");
   static_assert(Parts.actuator == 0 && !Parts.plant_poles,
                 "esokit: actuator and poles of a whole plant are in its matrices");
   static_assert(!Parts.follows_speed, "esokit: a model of a whole plant follows no speed");

@@ -307,6 +307,8 @@ class PredictorCorrector : public ObservedLevels<Order, S, Extension, Law, Level
     }
   }
 
+  static constexpr bool advances = gain_law_traits<Law>.advances;  ///< `advance` changes the laws
+
  private:
   friend struct detail::LaneAccess;
   friend struct detail::GuardAccess;

@@ -24,6 +24,15 @@
 namespace esokit {
 namespace detail {
 
+/// Names with numbers from `first`: "k1 k2 k3".
+inline std::string numbered(const char* name, int count, int first = 1) {
+  std::string all;
+  for (int i = first; i < first + count; ++i) {
+    all += (i > first ? " " : "") + (name + std::to_string(i));
+  }
+  return all;
+}
+
 /// What is private in a controller and an observer, and is recorded apart.
 struct RecordAccess {
   template <class C>
@@ -93,18 +102,30 @@ struct RecordAccess {
 
   // ---- A controller in two phases.
 
+  template <class Numbers, class C>
+  static Numbers armed(const C& c) {
+    (void)(all(is_finite(c.next_.blind)) && all(is_finite(c.next_.offset)) &&
+           all(is_finite(c.next_.slope)));
+    return {};
+  }
+  template <class Numbers, class C, class Gains>
+  static Numbers arm(C& c, const Gains& gains) {
+    using O = std::remove_cvref_t<decltype(c.observer_)>;
+    c.look_ahead();
+    if constexpr (O::levels > 1 || !observer_traits<O>.measures_first_row) {
+      c.arm_by(preview(c.observer_, gains));
+    } else {
+      c.arm_by(gains[0]);
+    }
+    return armed<Numbers>(c);
+  }
   /// The lists around which its text goes.
   template <class Number, class Observer, class Add>
   static void add_phases(const Add& add) {
     using Numbers = std::vector<Number>;
     constexpr RunningLaw runs = kind_of<LawOf<Observer>>;
     constexpr int size = Observer::size;
-    const auto armed = [](auto& c) {
-      (void)(all(is_finite(c.next_.blind)) && all(is_finite(c.next_.offset)) &&
-             all(is_finite(c.next_.slope)));
-      return Numbers{};
-    };
-    add("control_by", {"y"}, true, [](auto& c, const auto& in) {
+    add("control_by", "y", true, [](auto& c, const auto& in) {
       if constexpr (observer_traits<Observer>.gates_outliers) {  // asked before, by the text
         const Number u = c.wanted(in[0]);
         c.output_ = c.limiter_.clamp(select(c.usable(in[0], u), u, c.next_.blind));
@@ -113,76 +134,65 @@ struct RecordAccess {
         return Numbers{c.control(in[0])};
       }
     });
-    add("control_blind", {}, true,
+    add("control_blind", "", true,
         [](auto& c, const auto&) { return Numbers{c.control_without_measurement()}; });
-    add("refer", {"r"}, false, [](auto& c, const auto& in) {
+    add("refer", "r", false, [](auto& c, const auto& in) {
       for (Number& one : c.reference_) one = Number(0.0);
       c.reference_[0] = in[0];
       return Numbers{};
     });
-    add("take_output", {"u"}, false, [](auto& c, const auto& in) {
+    add("take_output", "u", false, [](auto& c, const auto& in) {
       c.output_ = in[0];
       return Numbers{};
     });
-    add("track", {}, false, [](auto& c, const auto&) {
+    add("track", "", false, [](auto& c, const auto&) {
       c.limiter_.track(c.output_);
       return Numbers{};
     });
-    add("revise", {"u"}, false, [](auto& c, const auto& in) {
+    add("revise", "u", false, [](auto& c, const auto& in) {
       (void)c.observer_.revise_input(in[0]);
       return Numbers{};
     });
-    add("arm_restart", {}, false, [armed](auto& c, const auto&) {
+    add("arm_restart", "", false, [](auto& c, const auto&) {
       using O = std::remove_cvref_t<decltype(c.observer_)>;
       typename O::Preview next{};
       for (Number& one : next.offset) one = Number(0.0);
       next.slope = O::Numbers::by_rows(O::Numbers::standing(Number(1.0)));
       c.look_ahead();
       c.arm_by(next);
-      return armed(c);
+      return armed<Numbers>(c);
     });
-    add("arm_hold", {}, false, [](auto& c, const auto&) {
+    add("arm_hold", "", false, [](auto& c, const auto&) {
       c.look_ahead();
       c.settle_for(Number(0.0));
       return Numbers{};
     });
-    add("arm_blind", {}, false, [](auto& c, const auto&) {
+    add("arm_blind", "", false, [](auto& c, const auto&) {
       c.look_ahead();
       c.settle_for_blind();
       return Numbers{};
     });
-    const auto arm = [armed](auto& c, const auto& gains) {
-      c.look_ahead();
-      if constexpr (Observer::levels > 1 || !observer_traits<Observer>.measures_first_row) {
-        c.arm_by(preview(c.observer_, gains));
-      } else {
-        c.arm_by(gains[0]);
-      }
-      return armed(c);
-    };
     using Gains = Array<ScaledGain<size, Number>, Observer::levels>;
     if constexpr (runs != RunningLaw::none) {
-      add("arm_by", {}, false, [arm](auto& c, const auto&) {
-        return arm(c, Gains{c.observer_.gain_law().gain(Number(0.0))});
+      add("arm_by", "", false, [](auto& c, const auto&) {
+        return arm<Numbers>(c, Gains{c.observer_.gain_law().gain(Number(0.0))});
       });
     } else {
-      std::vector<std::string> names;
-      for (int i = 1; i <= size * Observer::levels; ++i) names.push_back("k" + std::to_string(i));
-      add("arm_by", names, false, [arm](auto& c, const auto& in) {
+      add("arm_by", numbered("k", size * Observer::levels), false, [](auto& c, const auto& in) {
         Gains gains{};
         std::size_t next = 0;
         for (auto& level : gains) {
           for (Number& k : level) k = in[next++];
         }
-        return arm(c, gains);
+        return arm<Numbers>(c, gains);
       });
     }
     if constexpr (runs == RunningLaw::schedule) {
-      add("arm_long", {"contraction", "samples"}, false, [arm](auto& c, const auto& in) {
+      add("arm_long", "contraction samples", false, [](auto& c, const auto& in) {
         const EqualSampledPoles<size, Number> poles{in[0]};
-        return arm(c, Gains{long_step_gain<size, Number>(poles, in[1])});
+        return arm<Numbers>(c, Gains{long_step_gain<size, Number>(poles, in[1])});
       });
-      add("arm_blanked", {}, false, [](auto& c, const auto&) {
+      add("arm_blanked", "", false, [](auto& c, const auto&) {
         using C = std::remove_cvref_t<decltype(c)>;
         c.observer_.numbers_.laws[0].age_ = std::uint32_t{0};  // it publishes what it keeps
         typename C::Reference::All reference;
@@ -325,51 +335,38 @@ struct RecordAccess {
       constexpr int size =
           std::tuple_size_v<std::remove_cvref_t<decltype(std::declval<Law>().gain_)>>;
       using Poles = EqualSampledPoles<size, S>;
-      const auto nothing = S(0.0);
-      add("schedule_restart", {}, false,
-          [=](Law& law, const auto&) { return law.restart(), nothing; });
-      add("anchor_begin", {}, false, [=](Law& law, const auto&) {
+      add("schedule_restart", "", [](Law& law, const auto&) { law.restart(); });
+      add("anchor_begin", "", [](Law& law, const auto&) {
         law.power_ = S(1.0);
         law.bracket_ = S(0.0);
-        return nothing;
       });
-      add("anchor_take", {"power", "contraction"}, false, [=](Law& law, const auto& in) {
-        return Law::anchor_take(law.power_, law.bracket_, in[0], in[1]), nothing;
+      add("anchor_take", "power contraction", [](Law& law, const auto& in) {
+        Law::anchor_take(law.power_, law.bracket_, in[0], in[1]);
       });
-      add("anchor_contraction", {"power", "contraction"}, true,
+      add("anchor_contraction", "power contraction",
           [](Law&, const auto& in) { return S(in[1] + in[0] * in[1]); });
-      add("anchor_power", {"power", "contraction"}, true,
+      add("anchor_power", "power contraction",
           [](Law& law, const auto& in) { return law.squared(in[0], in[1]); });
-      add("anchor_end", {"count"}, false, [=](Law& law, const auto& in) {
-        law.bracket_ = law.bracket(in[0], law.bracket_);
-        return nothing;
-      });
-      add("schedule_next", {}, false, [=](Law& law, const auto&) {
+      add("anchor_end", "count",
+          [](Law& law, const auto& in) { law.bracket_ = law.bracket(in[0], law.bracket_); });
+      add("schedule_next", "", [](Law& law, const auto&) {
         law.push();
         law.set_gain();
-        return nothing;
       });
-      add("schedule_settle", {}, false, [=](Law& law, const auto&) {
+      add("schedule_settle", "", [](Law& law, const auto&) {
         if (all(law.settled_below_ >= std::get<0>(law.ratios_u_))) law.stand();
-        return nothing;
       });
-      add("present_poles", {}, true,
+      add("present_poles", "",
           [](Law& law, const auto&) { return law.present_poles().contraction; });
-      add("joined_poles", {"a", "b"}, true,
-          [](Law&, const auto& in) { return Poles::joined(in[0], in[1]); });
+      add("joined_poles", "a b", [](Law&, const auto& in) { return Poles::joined(in[0], in[1]); });
     } else if constexpr (kind_of<Law> == RunningLaw::filter) {
-      const auto nothing = S(0.0);
-      add("filter_corrected", {}, false,
-          [=](Law& law, const auto&) { return law.recur_usually(true), nothing; });
-      add("filter_missed", {}, false,
-          [=](Law& law, const auto&) { return law.recur_usually(false), nothing; });
-      add("filter_at_ceiling", {}, false, [=](Law& law, const auto&) {
+      add("filter_corrected", "", [](Law& law, const auto&) { law.recur_usually(true); });
+      add("filter_missed", "", [](Law& law, const auto&) { law.recur_usually(false); });
+      add("filter_at_ceiling", "", [](Law& law, const auto&) {
         if (all(!(law.now_.factor.variance(0) < law.ceiling()))) law.recur_at_ceiling();
-        return nothing;
       });
-      add("filter_to_limit", {}, false, [=](Law& law, const auto&) {
+      add("filter_to_limit", "", [](Law& law, const auto&) {
         if (law.now_.factor.near(law.limit_.factor, S(1e-3))) law.now_ = law.limit_;
-        return nothing;
       });
     }
   }

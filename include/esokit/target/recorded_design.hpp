@@ -3,6 +3,7 @@
 /// observer, recorded from its own calls.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cctype>
 #include <cmath>
@@ -13,6 +14,7 @@
 #include <esokit/target/recorder.hpp>
 #include <esokit/target/writable.hpp>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -47,6 +49,103 @@ template <class V>
   return rules;
 }
 
+/// The observer of a recorded subject, one type for all subjects.
+/// @{
+struct OfController {
+  template <class C>
+  auto& operator()(C& c) const {
+    return c.observer();
+  }
+};
+struct OfPredictive {
+  template <class C>
+  auto& operator()(C& c) const {
+    return RecordAccess::observer_of(c);
+  }
+};
+struct Itself {
+  template <class O>
+  auto& operator()(O& o) const {
+    return o;
+  }
+};
+struct NoName {
+  template <class O, class Number>
+  std::string operator()(const O&, const Number*) const {
+    return {};
+  }
+};
+/// @}
+
+/// Notes a call. @param arguments their names, with blanks between @return how many there are
+inline int note_call(RecordedDesign& design, std::string_view name, std::string_view arguments,
+                     bool has_output) {
+  std::vector<std::string> names;
+  while (!arguments.empty()) {
+    names.emplace_back(arguments.substr(0, arguments.find(' ')));
+    arguments.remove_prefix(std::min(arguments.size(), names.back().size() + 1));
+  }
+  const int count = static_cast<int>(names.size());
+  design.names.push_back({std::string(name), std::move(names), has_output});
+  return count;
+}
+
+/// Names a number of the object that has perhaps a name. @param level of a state, or -1, in its
+/// row @param published its place among those, or -1 @param setting begins the name of a setting
+/// @return whether it is read from outside
+inline bool name_number(RecordedDesign& design, std::string name, int level, int row, bool first,
+                        int published, const char* setting) {
+  if (level >= 0) {
+    name = "z" + std::to_string(row + 1);
+    if (level > 0) name += "_level" + std::to_string(level + 1);
+    if (first) design.first_state = name;
+  }
+  if (published >= 0) name = "published_" + std::to_string(published);
+  const bool live = name[0] == 'z' || name[0] == 'p' || name == "u_applied" || name == "u_given" ||
+                    name == "u_last" ||
+                    (design.options.watched && (name == "innovation" || name == "u_asked")) ||
+                    (design.guard.on && name == "innovation");
+  const std::string number = std::to_string(design.members.size());
+  if (setting != nullptr && name.empty()) name = setting + number;
+  design.members.push_back(name.empty() ? "x" + number : name);
+  return live;
+}
+
+/// Where the law of an angle subtracts an estimate from the reference, the difference becomes its
+/// argument: the text takes off whole turns. A law on physical estimates gets a reference without
+/// them. @return false where it does not
+inline bool take_angle(RecordedDesign& design) {
+  for (std::size_t i = 0; i < design.names.size(); ++i) {
+    if (design.names[i].name != "law") continue;
+    auto& list = design.calls[i].list.instructions;
+    const int of_call = static_cast<int>(design.members.size());
+    int reference = -1;
+    int difference = -1;
+    for (std::size_t k = 0; k < list.size(); ++k) {
+      const Instruction& one = list[k];
+      const int at = static_cast<int>(k);
+      if (one.operation == Operation::argument) {
+        if (one.a == of_call) reference = at;
+        continue;
+      }
+      if (reference < 0 || (one.a != reference && one.b != reference && one.c != reference)) {
+        continue;
+      }
+      const bool subtracts = one.operation == Operation::subtract && one.a == reference &&
+                             list[static_cast<std::size_t>(one.b)].operation == Operation::argument;
+      if (!subtracts || difference >= 0) return false;
+      difference = at;
+    }
+    if (difference < 0) return false;
+    Instruction& one = list[static_cast<std::size_t>(difference)];
+    design.wrap.angle =
+        design.members[static_cast<std::size_t>(list[static_cast<std::size_t>(one.b)].a)];
+    one = {.operation = Operation::argument, .a = of_call};
+    design.names[i].arguments[0] = "error";
+  }
+  return true;
+}
+
 /// Records a subject without its adapter.
 /// @tparam Subject the observer or controller @tparam Observer its observer, perhaps itself
 template <class Subject, class Observer>
@@ -67,10 +166,14 @@ class DesignRecorder {
 
   RecordedDesign design;
 
-  void add(const std::string& name, std::vector<std::string> arguments, bool has_output,
-           typename Recorder<Subject>::Call call) {
-    recorder_.add(static_cast<int>(arguments.size()), std::move(call));
-    design.names.push_back({name, std::move(arguments), has_output});
+  /// A call without memory of its own: as a pointer it takes no code beside its own.
+  using Plain = Numbers (*)(typename Recorder<Subject>::Recorded&, const Numbers&);
+  void add(std::string_view name, std::string_view arguments, bool has_output, Plain call) {
+    add_bound(name, arguments, has_output, call);
+  }
+  void add_bound(std::string_view name, std::string_view arguments, bool has_output,
+                 typename Recorder<Subject>::Call call) {
+    recorder_.add(note_call(design, name, arguments, has_output), std::move(call));
   }
 
   /// Records the calls of the observer, names the numbers. @param of the observer of a recorded
@@ -122,22 +225,18 @@ class DesignRecorder {
         name = "u_given";  // without what is known
       }
       if (numbers[i] == &core.innovation()) name = "innovation";
-      for (int row = 0; row < size && 0 <= state && state < gains; ++row) {
-        if (Model::state_of_row(row) != state % size) continue;
-        name = "z" + std::to_string(row + 1);
-        if (state >= size) name += "_level" + std::to_string(state / size + 1);
-        if (state == 0) design.first_state = name;
+      int level = -1;
+      int row = 0;
+      if (0 <= state && state < gains) {
+        level = static_cast<int>(state) / size;
+        while (Model::state_of_row(row) != state % size) ++row;
       }
-      const int published = RecordAccess::place_in_published(core, numbers[i]);
-      if (published >= 0) name = "published_" + std::to_string(published);
-      writer.live[i] = name[0] == 'z' || name[0] == 'p' || name == "u_applied" ||
-                       name == "u_given" || name == "u_last" ||
-                       (design.options.watched && (name == "innovation" || name == "u_asked")) ||
-                       (design.guard.on && name == "innovation");
+      const char* setting = nullptr;
       for (const auto& [number, begins] : settings) {
-        if (number == numbers[i] && name.empty()) name = begins + std::to_string(i);
+        if (setting == nullptr && number == numbers[i]) setting = begins;
       }
-      design.members.push_back(name.empty() ? "x" + std::to_string(i) : name);
+      writer.live[i] = name_number(design, std::move(name), level, row, state == 0,
+                                   RecordAccess::place_in_published(core, numbers[i]), setting);
     }
     writer.find_live(*recorded);
     design.live = writer.live;
@@ -152,10 +251,12 @@ class DesignRecorder {
   void add_observer(const OfAny& of_any) {
     using Law = std::remove_cvref_t<decltype(RecordAccess::laws(std::declval<const Core&>())[0])>;
     constexpr RunningLaw runs = RecordAccess::kind_of<Law>;
-    const auto all_of = [of_any](auto& c) -> auto& { return RecordAccess::at_rest(of_any(c)); };
-    const auto of = [all_of](auto& c) -> auto& { return RecordAccess::core(all_of(c)); };
+    static constexpr auto all_of = [](auto& c) -> auto& {
+      return RecordAccess::at_rest(OfAny{}(c));
+    };
+    static constexpr auto of = [](auto& c) -> auto& { return RecordAccess::core(all_of(c)); };
     if constexpr (RecordAccess::knows<Observer>) {
-      add("drive", {"u"}, true, [all_of](auto& c, const Numbers& in) {
+      add("drive", "u", true, [](auto& c, const Numbers& in) {
         return Numbers{RecordAccess::driven(all_of(c), in[0])};
       });
     }
@@ -164,15 +265,22 @@ class DesignRecorder {
       using Recorded = std::remove_cvref_t<decltype(RecordAccess::laws(
           RecordAccess::core(of_any(std::declval<typename Recorder<Subject>::Recorded&>())))[0])>;
       RecordAccess::add_law<Recorded>(
-          [&](const char* name, std::vector<std::string> arguments, bool has_output, auto call) {
-            add(name, std::move(arguments), has_output, [=](auto& c, const Numbers& in) {
-              const Number output = call(RecordAccess::laws(RecordAccess::core(of_any(c)))[0], in);
-              return has_output ? Numbers{output} : Numbers{};
+          [&]<class Call>(std::string_view name, std::string_view arguments, const Call&) {
+            constexpr bool has_output =
+                !std::is_void_v<std::invoke_result_t<Call, Recorded&, const Numbers&>>;
+            add(name, arguments, has_output, [](auto& c, const Numbers& in) {
+              auto& law = RecordAccess::laws(RecordAccess::core(OfAny{}(c)))[0];
+              if constexpr (has_output) {
+                return Numbers{Call{}(law, in)};
+              } else {
+                Call{}(law, in);
+                return Numbers{};
+              }
             });
           });
     }
     if constexpr (runs == RunningLaw::schedule) {
-      add("correct_long", {"y", "contraction", "samples"}, false, [of](auto& c, const Numbers& in) {
+      add("correct_long", "y contraction samples", false, [](auto& c, const Numbers& in) {
         const EqualSampledPoles<size, Number> poles{in[1]};
         RecordAccess::correct(
             of(c), in[0],
@@ -182,7 +290,7 @@ class DesignRecorder {
     }
     if constexpr (runs == RunningLaw::filter) {
       if (design.law.watches) {
-        add("fits", {"y"}, false, [of](auto& c, const Numbers& in) {
+        add("fits", "y", false, [](auto& c, const Numbers& in) {
           RecordAccess::judge(of(c), in[0]);
           return Numbers{};
         });
@@ -190,7 +298,7 @@ class DesignRecorder {
     }
     if constexpr (ShiftableOutput<Core>) {
       if (design.wrap.period > 0) {
-        add("shift", {"offset"}, false, [of](auto& c, const Numbers& in) {
+        add("shift", "offset", false, [](auto& c, const Numbers& in) {
           (void)of(c).shift_output(in[0]);
           return Numbers{};
         });
@@ -199,7 +307,7 @@ class DesignRecorder {
     if constexpr (ShiftableLoad<Core>) {
       if (design.measured.on) {
         const auto column = RecordAccess::load_column(RecordAccess::core(of_any(subject_)));
-        add("load", {"offset"}, false, [of, column](auto& c, const Numbers& in) {
+        add_bound("load", "offset", false, [column](auto& c, const Numbers& in) {
           RecordAccess::load(of(c), column, in[0]);
           return Numbers{};
         });
@@ -207,41 +315,35 @@ class DesignRecorder {
     }
     if constexpr (model_traits<typename Core::PlantModel>.is_chain && size == Observer::order + 1) {
       if (design.guard.on) {
-        std::vector<std::string> states;
-        for (int i = 1; i <= size; ++i) states.push_back("x" + std::to_string(i));
-        states.push_back("u");
-        add("predicted_y", states, true, [of](auto& c, const Numbers& in) {
+        add("predicted_y", numbered("x", size) + " u", true, [](auto& c, const Numbers& in) {
           return Numbers{RecordAccess::predicted_y(of(c), in)};
         });
-        std::vector<std::string> found{"y"};
-        for (int i = 1; i <= Observer::levels; ++i) found.push_back("d" + std::to_string(i));
-        add("stand_at", found, false, [of](auto& c, const Numbers& in) {
-          RecordAccess::stand_at(of(c), in);
-          return Numbers{};
-        });
+        add("stand_at", "y " + numbered("d", Observer::levels), false,
+            [](auto& c, const Numbers& in) {
+              RecordAccess::stand_at(of(c), in);
+              return Numbers{};
+            });
         if (design.guard.by_input) {
-          add("scale_found", {"change"}, false, [of](auto& c, const Numbers& in) {
+          add("scale_found", "change", false, [](auto& c, const Numbers& in) {
             RecordAccess::scale_found(of(c), in[0]);
             return Numbers{};
           });
-          add("scaled_bound", {"bound"}, true, [of](auto& c, const Numbers& in) {
+          add("scaled_bound", "bound", true, [](auto& c, const Numbers& in) {
             return Numbers{of(c).model().scaled_disturbance(in[0])};
           });
         }
       }
     }
-    add("observe", {"y", "u"}, false, [of](auto& c, const Numbers& in) {
+    add("observe", "y u", false, [](auto& c, const Numbers& in) {
       (void)of(c).update(in[0], in[1]);
       return Numbers{};
     });
-    add("predict_step", {"u"}, false, [of](auto& c, const Numbers& in) {
+    add("predict_step", "u", false, [](auto& c, const Numbers& in) {
       (void)of(c).predict(in[0]);
       return Numbers{};
     });
-    std::vector<std::string> arguments{"y"};
-    for (int i = 1; i <= gains; ++i) arguments.push_back("k" + std::to_string(i));
     if constexpr (runs == RunningLaw::none)
-      add("correct_by", arguments, false, [of](auto& c, const Numbers& in) {
+      add("correct_by", "y " + numbered("k", gains), false, [](auto& c, const Numbers& in) {
         Array<ScaledGain<size, Number>, Observer::levels> given{};
         std::size_t next = 1;
         for (auto& level : given) {
@@ -251,63 +353,31 @@ class DesignRecorder {
         return Numbers{};
       });
     if (!design.gain_is_kept) {
-      add("correct_step", {"y"}, false, [of](auto& c, const Numbers& in) {
+      add("correct_step", "y", false, [](auto& c, const Numbers& in) {
         (void)of(c).correct(in[0]);
         return Numbers{};
       });
     }
-    add("restart_at", {"y"}, false, [of](auto& c, const Numbers& in) {
+    add("restart_at", "y", false, [](auto& c, const Numbers& in) {
       (void)of(c).reset(in[0]);
       return Numbers{};
     });
     unroll<size>([&](auto row) {
-      add("estimate_" + std::to_string(int{row}), {}, true, [all_of](auto& c, const Numbers&) {
+      add("estimate_" + std::to_string(int{row}), "", true, [](auto& c, const Numbers&) {
         return Numbers{RecordAccess::estimate<int{decltype(row)::value}>(all_of(c))};
       });
     });
   }
 
-  /// Where the law of an angle subtracts an estimate from the reference, the difference becomes its
-  /// argument: the text takes off whole turns. A law on physical estimates gets a reference without
-  /// them.
+  /// `take_angle` where the law is of an angle.
   [[nodiscard]] Check<V> take_angle() {
     if (!(design.wrap.period > 0) || !design.is_controller || design.error_based ||
         design.compensates) {
       return {};
     }
-    const Error<V> refused{"soften", V(1), "of an angle is not written for this observer"};
-    if constexpr (RecordAccess::blanks<Core> || RecordAccess::knows<Observer>) {
-      if (design.softens) return refused;
-      return {};
-    }
-    for (std::size_t i = 0; i < design.names.size(); ++i) {
-      if (design.names[i].name != "law") continue;
-      auto& list = design.calls[i].list.instructions;
-      const int of_call = static_cast<int>(design.members.size());
-      int reference = -1;
-      int difference = -1;
-      for (std::size_t k = 0; k < list.size(); ++k) {
-        const Instruction& one = list[k];
-        const int at = static_cast<int>(k);
-        if (one.operation == Operation::argument) {
-          if (one.a == of_call) reference = at;
-          continue;
-        }
-        if (reference < 0 || (one.a != reference && one.b != reference && one.c != reference)) {
-          continue;
-        }
-        const bool subtracts =
-            one.operation == Operation::subtract && one.a == reference &&
-            list[static_cast<std::size_t>(one.b)].operation == Operation::argument;
-        if (!subtracts || difference >= 0) return refused;
-        difference = at;
-      }
-      if (difference < 0) return refused;
-      Instruction& one = list[static_cast<std::size_t>(difference)];
-      design.wrap.angle =
-          design.members[static_cast<std::size_t>(list[static_cast<std::size_t>(one.b)].a)];
-      one = {.operation = Operation::argument, .a = of_call};
-      design.names[i].arguments[0] = "error";
+    constexpr bool elsewhere = RecordAccess::blanks<Core> || RecordAccess::knows<Observer>;
+    if (elsewhere ? design.softens : !detail::take_angle(design)) {
+      return Error<V>{"soften", V(1), "of an angle is not written for this observer"};
     }
     return {};
   }
@@ -365,6 +435,50 @@ std::vector<std::array<double, 3>> self_test_samples(int count, Step&& step) {
   return samples;
 }
 
+/// Records the calls of a controller without its adapters, of which the design knows already.
+template <class Bare, class BareObserver>
+[[nodiscard]] Check<typename Bare::scalar_type> record_controller(
+    DesignRecorder<Bare, BareObserver>& maker) {
+  using Access = RecordAccess;
+  using Number = typename DesignRecorder<Bare, BareObserver>::Number;
+  using Numbers = typename DesignRecorder<Bare, BareObserver>::Numbers;
+  RecordedDesign& design = maker.design;
+  const bool wraps = design.wrap.period > 0;
+  const bool around_angle = design.known.around_angle;
+  maker.add_bound("rest_at", wraps ? "y u angle" : "y u", false,
+                  [around_angle](auto& c, const Numbers& in) {
+                    Access::rest(Access::at_rest(c.observer()), in, around_angle);
+                    return Numbers{};
+                  });
+  if constexpr (Access::blanks<BareObserver>) {
+    maker.add("law", "r " + numbered("e", BareObserver::size, 0), true,
+              [](auto& c, const Numbers& in) { return Numbers{Access::law_for(c, in)}; });
+  } else {
+    maker.add("law", "r", true,
+              [](auto& c, const Numbers& in) { return Numbers{Access::law(c, in[0])}; });
+  }
+  maker.add("limit", "u", true, [](auto& c, const Numbers& in) {
+    return Numbers{Access::limited(Access::loop(c), in[0])};
+  });
+  maker.add("applied", "u", false, [](auto& c, const Numbers& in) {
+    Access::loop(c).applied(in[0]);
+    return Numbers{};
+  });
+  if (design.softens) {
+    maker.add("harden", "", false, [](auto& c, const Numbers&) {
+      Access::harden(c);
+      return Numbers{};
+    });
+  }
+  const auto name_of = [](const auto& c, const Number* at) -> std::string {
+    // The limiter keeps the bounds of the next output behind the last.
+    constexpr const char* names[] = {"u_last", "u_low", "u_high"};
+    const auto place = at - &c.output();
+    return 0 <= place && place < 3 ? names[place] : at == &c.requested() ? "u_asked" : "";
+  };
+  return maker.record(OfController{}, name_of);
+}
+
 /// The design of a controller.
 template <WritableController C>
 Expected<RecordedDesign, Error<typename C::scalar_type>> recorded_design(
@@ -374,8 +488,6 @@ Expected<RecordedDesign, Error<typename C::scalar_type>> recorded_design(
   using Of = ObserverOfController<C>;
   using Bare = typename WithoutAdapter<C>::type;
   using Maker = DesignRecorder<Bare, typename WithoutAdapter<typename Of::type>::type>;
-  using Number = typename Maker::Number;
-  using Numbers = typename Maker::Numbers;
 
   if (const auto rules = checked_options<V>(options); !rules) return rules.error();
   const Bare bare = without_adapter(controller);
@@ -391,45 +503,7 @@ Expected<RecordedDesign, Error<typename C::scalar_type>> recorded_design(
   take_adapters(design, controller.observer());
   design.law = Access::law_numbers(Access::core(bare.observer()));
 
-  const bool wraps = design.wrap.period > 0;
-  std::vector<std::string> of_rest{"y", "u"};
-  if (wraps) of_rest.push_back("angle");
-  const bool around_angle = design.known.around_angle;
-  maker.add("rest_at", of_rest, false, [around_angle](auto& c, const Numbers& in) {
-    Access::rest(Access::at_rest(c.observer()), in, around_angle);
-    return Numbers{};
-  });
-  using BareObserver = typename WithoutAdapter<typename Of::type>::type;
-  if constexpr (Access::blanks<BareObserver>) {
-    std::vector<std::string> of_law{"r"};
-    for (int i = 0; i < BareObserver::size; ++i) of_law.push_back("e" + std::to_string(i));
-    maker.add("law", of_law, true,
-              [](auto& c, const Numbers& in) { return Numbers{Access::law_for(c, in)}; });
-  } else {
-    maker.add("law", {"r"}, true,
-              [](auto& c, const Numbers& in) { return Numbers{Access::law(c, in[0])}; });
-  }
-  maker.add("limit", {"u"}, true, [](auto& c, const Numbers& in) {
-    return Numbers{Access::limited(Access::loop(c), in[0])};
-  });
-  maker.add("applied", {"u"}, false, [](auto& c, const Numbers& in) {
-    Access::loop(c).applied(in[0]);
-    return Numbers{};
-  });
-  if (design.softens) {
-    maker.add("harden", {}, false, [](auto& c, const Numbers&) {
-      Access::harden(c);
-      return Numbers{};
-    });
-  }
-  const auto name_of = [](const auto& c, const Number* at) -> std::string {
-    // The limiter keeps the bounds of the next output behind the last.
-    constexpr const char* names[] = {"u_last", "u_low", "u_high"};
-    const auto place = at - &c.output();
-    return 0 <= place && place < 3 ? names[place] : at == &c.requested() ? "u_asked" : "";
-  };
-  const auto of = [](auto& c) -> auto& { return c.observer(); };
-  if (auto ok = maker.record(of, name_of); !ok) return ok.error();
+  if (auto ok = record_controller(maker); !ok) return ok.error();
   if (design.error_based) design.input_gain = -design.input_gain;
   C played = controller;
   design.samples = self_test_samples<V>(options.self_test_samples,
@@ -450,9 +524,7 @@ Expected<RecordedDesign, Error<typename Observer::scalar_type>> recorded_design(
   Maker maker(bare, options);
   take_adapters(maker.design, observer);
   maker.design.law = RecordAccess::law_numbers(RecordAccess::core(bare));
-  const auto of = [](auto& o) -> auto& { return o; };
-  const auto no_name = [](const auto&, const auto*) { return std::string(); };
-  if (auto ok = maker.record(of, no_name); !ok) return ok.error();
+  if (auto ok = maker.record(Itself{}, NoName{}); !ok) return ok.error();
   Observer played = observer;
   maker.design.samples = self_test_samples<V>(options.self_test_samples, [&](V y, V u) {
     (void)played.update(y, u);
@@ -482,20 +554,20 @@ Expected<RecordedDesign, Error<typename C::scalar_type>> recorded_design(
   design.hold = RecordAccess::hold_left(controller);
   design.lower = static_cast<double>(RecordAccess::limiter(controller).lower());
   design.upper = static_cast<double>(RecordAccess::limiter(controller).upper());
-  const auto of = [](auto& c) -> auto& { return RecordAccess::observer_of(c); };
-  maker.add("rest_at", {"y", "u"}, false, [of](auto& c, const Numbers& in) {
-    RecordAccess::rest(RecordAccess::at_rest(of(c)), in, false);
+  maker.add("rest_at", "y u", false, [](auto& c, const Numbers& in) {
+    RecordAccess::rest(RecordAccess::at_rest(OfPredictive{}(c)), in, false);
     return Numbers{};
   });
-  RecordAccess::add_phases<Number, Observer>(
-      [&](const char* name, std::vector<std::string> arguments, bool has_output, auto call) {
-        maker.add(name, std::move(arguments), has_output,
-                  [call](auto& c, const Numbers& in) { return call(c, in); });
-      });
+  RecordAccess::add_phases<Number, Observer>([&]<class Call>(std::string_view name,
+                                                             std::string_view arguments,
+                                                             bool has_output, const Call&) {
+    maker.add(name, arguments, has_output,
+              [](auto& c, const Numbers& in) { return Call{}(c, in); });
+  });
   const auto name_of = [](const auto& c, const Number* at) -> std::string {
     return at == &c.output() ? "u_last" : "";
   };
-  if (auto ok = maker.record(of, name_of); !ok) return ok.error();
+  if (auto ok = maker.record(OfPredictive{}, name_of); !ok) return ok.error();
   C played = controller;
   design.samples = self_test_samples<V>(options.self_test_samples,
                                         [&](V y, V r) { return played.update(y, r); });

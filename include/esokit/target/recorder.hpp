@@ -39,15 +39,15 @@ struct RecordedObject {
 
 namespace detail {
 
-/// Calls number(x) for each number of type S in `object`, and other(address, bytes) for all else.
-template <class S, class Object, class Number, class Other>
-void visit_members(Object& object, const Number& number, const Other& other) {
+/// Calls found(x) for each number of type S in `object`, and found(address, bytes) for all else.
+template <class S, class Object, class Found>
+void visit_members(Object& object, const Found& found) {
   using T = std::remove_const_t<Object>;
-  const auto deeper = [&](auto& member) { visit_members<S>(member, number, other); };
+  const auto deeper = [&](auto& member) { visit_members<S>(member, found); };
   if constexpr (std::is_empty_v<T>) {
     return;
   } else if constexpr (std::is_same_v<T, S>) {
-    number(object);
+    found(object);
   } else if constexpr (HoldsElements<T>) {
     for (decltype(object.size()) k = 0; k < object.size(); ++k) deeper(object.data()[k]);
   } else if constexpr (IsOptional<T>::value) {
@@ -57,16 +57,34 @@ void visit_members(Object& object, const Number& number, const Other& other) {
   } else if constexpr (LaneAccess::has_members<T>) {
     LaneAccess::with_members(object, [&](auto&... members) { (deeper(members), ...); });
   } else {
-    other(&object, sizeof object);
+    found(&object, sizeof object);
   }
 }
+
+/// What is found, one type for all objects: what takes apart a part of two is compiled once.
+/// @{
+template <class S>
+struct FoundNumbers {
+  void operator()(S& number) const { numbers->push_back(&number); }
+  void operator()(const void*, std::size_t) const {}
+  std::vector<S*>* numbers;
+};
+template <class S>
+struct FoundBytes {
+  void operator()(const S&) const {}
+  void operator()(const void* from, std::size_t size) const {
+    const auto* first = static_cast<const unsigned char*>(from);
+    bytes->insert(bytes->end(), first, first + size);
+  }
+  std::vector<unsigned char>* bytes;
+};
+/// @}
 
 /// All numbers of an object.
 template <class S, class Object>
 auto numbers_of(Object& object) {
   std::vector<S*> numbers;
-  visit_members<S>(
-      object, [&](S& x) { numbers.push_back(&x); }, [](const void*, std::size_t) {});
+  visit_members<S>(object, FoundNumbers<S>{&numbers});
   return numbers;
 }
 
@@ -74,13 +92,46 @@ auto numbers_of(Object& object) {
 template <class S, class Object>
 std::vector<unsigned char> counters_of(const Object& object) {
   std::vector<unsigned char> bytes;
-  visit_members<S>(
-      object, [](const S&) {},
-      [&](const void* from, std::size_t size) {
-        const auto* first = static_cast<const unsigned char*>(from);
-        bytes.insert(bytes.end(), first, first + size);
-      });
+  visit_members<S>(object, FoundBytes<S>{&bytes});
   return bytes;
+}
+
+/// Records a call. @param constants the numbers in the beginning @param numbers those of the object
+/// that is called @param grew becomes true if the call changes a number that was thought constant
+template <class V>
+RecordedCall record_call(
+    int count,
+    const std::function<std::vector<RecordingScalar<V>>(const std::vector<RecordingScalar<V>>&)>&
+        call,
+    const std::vector<RecordingScalar<V>*>& constants,
+    const std::vector<RecordingScalar<V>*>& numbers, std::vector<bool>& moves, bool& grew,
+    bool& looked) {
+  RecordedCall result;
+  std::vector<int> before(numbers.size(), -1);
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    *numbers[i] = *constants[i];
+    if (!moves[i]) continue;
+    *numbers[i] = RecordingScalar<V>(result.list, static_cast<int>(i), constants[i]->value());
+    before[i] = numbers[i]->index_in(result.list);
+  }
+  std::vector<RecordingScalar<V>> arguments;
+  for (int i = 0; i < count; ++i) {
+    arguments.emplace_back(result.list, static_cast<int>(numbers.size()) + i, V(0.125));
+  }
+  const std::vector<RecordingScalar<V>> outputs = call(arguments);
+  result.next.assign(numbers.size(), -1);
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    const V was = constants[i]->value();
+    const V is = numbers[i]->value();
+    const bool differs = std::memcmp(&was, &is, sizeof(V)) != 0;
+    if (!moves[i] && (!numbers[i]->is_constant() || differs)) moves[i] = grew = true;
+    if (!moves[i]) continue;
+    const int next = numbers[i]->index_in(result.list);
+    if (next != before[i]) result.next[i] = next;
+  }
+  for (const auto& output : outputs) result.outputs.push_back(output.index_in(result.list));
+  looked = result.list.was_looked_into;
+  return result;
 }
 
 }  // namespace detail
@@ -177,39 +228,14 @@ class Recorder {
   };
   static constexpr std::size_t most_lists = 64;
 
-  /// Calls `object` with its numbers as they are in the beginning. @param grew becomes true if the
-  /// call changes a number that was thought constant
+  /// Calls `object` with its numbers as they are in the beginning.
   RecordedCall record_one(Recorded& object, const Entry& entry, std::vector<bool>& moves,
                           bool& grew, bool& looked) const {
-    RecordedCall result;
     Recorded beginning = object_;
-    const auto constants = detail::numbers_of<Number>(beginning);
-    const auto numbers = detail::numbers_of<Number>(object);
-    std::vector<int> before(numbers.size(), -1);
-    for (std::size_t i = 0; i < numbers.size(); ++i) {
-      *numbers[i] = *constants[i];
-      if (!moves[i]) continue;
-      *numbers[i] = Number(result.list, static_cast<int>(i), constants[i]->value());
-      before[i] = numbers[i]->index_in(result.list);
-    }
-    Arguments arguments;
-    for (int i = 0; i < entry.arguments; ++i) {
-      arguments.emplace_back(result.list, static_cast<int>(numbers.size()) + i, V(0.125));
-    }
-    const Arguments outputs = entry.call(object, arguments);
-    result.next.assign(numbers.size(), -1);
-    for (std::size_t i = 0; i < numbers.size(); ++i) {
-      const V was = constants[i]->value();
-      const V is = numbers[i]->value();
-      const bool differs = std::memcmp(&was, &is, sizeof(V)) != 0;
-      if (!moves[i] && (!numbers[i]->is_constant() || differs)) moves[i] = grew = true;
-      if (!moves[i]) continue;
-      const int next = numbers[i]->index_in(result.list);
-      if (next != before[i]) result.next[i] = next;
-    }
-    for (const Number& output : outputs) result.outputs.push_back(output.index_in(result.list));
-    looked = result.list.was_looked_into;
-    return result;
+    return detail::record_call<V>(
+        entry.arguments, [&](const Arguments& in) { return entry.call(object, in); },
+        detail::numbers_of<Number>(beginning), detail::numbers_of<Number>(object), moves, grew,
+        looked);
   }
 
   Recorded object_;

@@ -70,7 +70,8 @@ struct OperationList {
   bool was_looked_into = false;
 
   /// Notes an operation. @return its index, that of an equal one if there is one
-  int note(const Instruction& given) {
+  // Not inlined, as what follows that notes: a flattened step would hold it at each operation.
+  [[gnu::noinline]] int note(const Instruction& given) {
     for (std::size_t i = 0; i < instructions.size(); ++i) {
       const Instruction& one = instructions[i];
       if (one.operation == given.operation && one.a == given.a && one.b == given.b &&
@@ -158,8 +159,9 @@ class RecordedCondition {
   }
 
  private:
-  [[nodiscard]] RecordedCondition with(Operation operation, const RecordedCondition& b,
-                                       bool holds) const {
+  [[nodiscard, gnu::noinline]] RecordedCondition with(Operation operation,
+                                                      const RecordedCondition& b,
+                                                      bool holds) const {
     OperationList& list = *noted_.list;
     return {holds,
             {&list, list.note({.operation = operation, .a = noted_.index, .b = b.noted_.index})}};
@@ -276,6 +278,13 @@ class RecordingScalar {
     return {holds, {&list, list.note({.operation = Operation::finite, .a = a.noted_.index})}};
   }
   friend Self select(const RecordedCondition& condition, const Self& a, const Self& b) {
+    return chosen(condition, a, b);
+  }
+  /// @}
+
+ private:
+  [[nodiscard, gnu::noinline]] static Self chosen(const RecordedCondition& condition, const Self& a,
+                                                  const Self& b) {
     Self chosen = condition.holds() ? a : b;
     if (condition.noted().known()) return chosen;
     OperationList& list = *condition.noted().list;
@@ -289,29 +298,27 @@ class RecordingScalar {
     chosen.noted_ = {&list, index};
     return chosen;
   }
-  /// @}
-
- private:
-  [[nodiscard]] Self with(Operation operation, V value) const {
+  [[nodiscard, gnu::noinline]] Self with(Operation operation, V value) const {
     Self result(static_cast<double>(value));
     if (!is_constant()) {
       result.noted_ = {noted_.list, noted_.list->note({.operation = operation, .a = noted_.index})};
     }
     return result;
   }
-  [[nodiscard]] detail::Noted both(Operation operation, const Self& b) const {
+  [[nodiscard, gnu::noinline]] detail::Noted both(Operation operation, const Self& b) const {
     if (is_constant() && b.is_constant()) return {};
     OperationList& list = is_constant() ? *b.noted_.list : *noted_.list;
     const int first = index_in(list);
     const int second = b.index_in(list);
     return {&list, list.note({.operation = operation, .a = first, .b = second})};
   }
-  [[nodiscard]] Self with(Operation operation, const Self& b, V value) const {
+  [[nodiscard, gnu::noinline]] Self with(Operation operation, const Self& b, V value) const {
     Self result(static_cast<double>(value));
     result.noted_ = both(operation, b);
     return result;
   }
-  [[nodiscard]] RecordedCondition compared(Operation operation, const Self& b, bool holds) const {
+  [[nodiscard, gnu::noinline]] RecordedCondition compared(Operation operation, const Self& b,
+                                                          bool holds) const {
     return {holds, both(operation, b)};
   }
 
