@@ -51,12 +51,12 @@ constexpr ModelParts of_plant(ModelParts parts, int states) noexcept {
 ///                       .model = {.plant = plant, .resonators = {{{.frequency = 314}}}}});
 /// ```
 template <int States, ModelParts Parts, Scalar S = double, class Placement = EqualPoles>
-requires(States >= 1)  //
+requires(States >= 1 && (Parts.states == 0 || Parts.states == States))  //
     using PlantEso = ModelEso<detail::of_plant(Parts, States), S, Placement>;
 
 /// CascadeEso with the same model.
 template <int States, ModelParts Parts, int Levels, Scalar S = double, class Placement = EqualPoles>
-requires(States >= 1)  //
+requires(States >= 1 && (Parts.states == 0 || Parts.states == States))  //
     using PlantCascadeEso = ModelCascadeEso<detail::of_plant(Parts, States), Levels, S, Placement>;
 
 /// The parts of a disturbance at the present time, each in the unit of d: that of y^(n), or with
