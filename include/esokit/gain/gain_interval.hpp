@@ -80,11 +80,11 @@ constexpr Gain multiplied(Gain gain, const S& k) noexcept {
   return gain;
 }
 
-/// True if the observer is certified stable for any variation of the factor between `low` and
-/// `high`.
-/// @param gain a ScaledGain, or the gain vector of a continuous observer
-template <int Size, Scalar S, class Gain>
-[[nodiscard]] bool gain_range_certified(const Gain& gain, const S& low, const S& high) {
+/// True if the sampled observer is certified stable for any variation of the factor between `low`
+/// and `high`.
+template <int Size, Scalar S>
+[[nodiscard]] bool gain_range_certified(const ScaledGain<Size, S>& gain, const S& low,
+                                        const S& high) {
   return switching_certified<Size, S>(multiplied<Size, S>(gain, low),
                                       multiplied<Size, S>(gain, high));
 }

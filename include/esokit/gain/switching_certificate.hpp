@@ -62,21 +62,26 @@ bool same_half_plane(const ErrorPolynomial<Size, S>& p, const ErrorPolynomial<Si
   return positive_on_half_line<Size, S>(half_plane_product<Size, S>(p, q));
 }
 
-}  // namespace detail
-
-/// True if the errors of two gain sets of one observer share a quadratic Lyapunov function. Then
-/// every gain on the segment between them is stable, however it varies.
-/// @param first, second scaled current-estimator gains of a sampled observer, or with
-///        sim/continuous_certificate.hpp l of a continuous one, N x 1, row i in 1/s^(i+1)
 template <int Size, Scalar S, class Gain>
-[[nodiscard]] bool switching_certified(const Gain& first, const Gain& second) {
+[[nodiscard]] bool certified_pair(const Gain& first, const Gain& second) {
   const S unit = S(0.5) * (frequency_scale<Size, S>(first) + frequency_scale<Size, S>(second));
   if (!is_finite(unit) || !(unit > S(0.0))) return false;
   const auto p = error_polynomial<Size, S>(first, unit);
   const auto q = error_polynomial<Size, S>(second, unit);
   // If it is positive along the whole axis, p and q have equally many roots in the right half
   // plane, so Routh's test of p is enough.
-  return is_hurwitz<Size, S>(p) && detail::same_half_plane<Size, S>(p, q);
+  return is_hurwitz<Size, S>(p) && same_half_plane<Size, S>(p, q);
+}
+
+}  // namespace detail
+
+/// True if the errors of two gain sets of one sampled observer share a quadratic Lyapunov function.
+/// Then every gain on the segment between them is stable, however it varies.
+/// @param first, second scaled current-estimator gains
+template <int Size, Scalar S>
+[[nodiscard]] bool switching_certified(const ScaledGain<Size, S>& first,
+                                       const ScaledGain<Size, S>& second) {
+  return detail::certified_pair<Size, S>(first, second);
 }
 
 /// tan^2(pi (N-1) / (4N)): two continuous gain sets with all poles at -w and at -rho w, rho < 1,

@@ -32,6 +32,23 @@ S frequency_scale(const Vector<S, Size>& gain) {
   return S(static_cast<double>(Size)) * gain(Size - 1) / gain(Size - 2);
 }
 
+/// True if the errors of two gain sets of a continuous observer share a quadratic Lyapunov
+/// function: then every l(t) on the segment between them is stable, however it varies.
+/// @param first, second l, N x 1, row i in 1/s^(i+1)
+template <int Size, Scalar S>
+[[nodiscard]] bool switching_certified(const Vector<S, Size>& first,
+                                       const Vector<S, Size>& second) {
+  return detail::certified_pair<Size, S>(first, second);
+}
+
+/// True if the continuous observer is certified stable for any variation of the factor between
+/// `low` and `high`. @param gain l
+template <int Size, Scalar S>
+[[nodiscard]] bool gain_range_certified(const Vector<S, Size>& gain, const S& low, const S& high) {
+  const Vector<S, Size> first = gain * low, second = gain * high;
+  return switching_certified<Size, S>(first, second);
+}
+
 /// Smallest k_min for which any variation of k within [k_min, 1] is certified for the continuous
 /// observer.
 template <int Size>
