@@ -333,24 +333,26 @@ class ExtendedStateFilter
 
   /// Adds sat(fbar(x+, u, t + T) - fbar(x, u, t)) to d: (6), with the input that the printed
   /// prediction of x+ lacks.
-  void shift_by_model(const Estimate& before) noexcept requires(has_model) {
-    const S time = this->sample_time();
-    const S t = detail::integer<S>(rest_.sample) * time;
-    const S u = this->applied_input();
-    Vector<S, Order> x = before.template head<Order>();
-    const S now = rest_.set.nominal_model(x, u, t);
-    // x+: predicted along the chain, with fbar in place of the estimated disturbance.
-    Estimate start = before;
-    start(Order) = now;
-    const S drive = Chain::scaled_input_gain(this->input_gain(), time) * u;
-    const auto ahead = Chain::template predict<1>(Chain::scaled(start, time), Array<S, 1>{drive});
-    x = Chain::physical(ahead, S(S(1.0) / time)).template head<Order>();
-    const S change = rest_.set.nominal_model(x, u, S(t + time)) - now;
-    const S low = select(change < -rest_.set.change_bound, S(-rest_.set.change_bound), change);
-    const S limited = select(rest_.set.change_bound < low, rest_.set.change_bound, low);
-    const S sum = this->total_disturbance() + limited;
-    this->shift_disturbance(select(is_finite(sum), limited, S(0.0)));
-    ++rest_.sample;
+  void shift_by_model(const Estimate& before) noexcept {
+    if constexpr (has_model) {
+      const S time = this->sample_time();
+      const S t = detail::integer<S>(rest_.sample) * time;
+      const S u = this->applied_input();
+      Vector<S, Order> x = before.template head<Order>();
+      const S now = rest_.set.nominal_model(x, u, t);
+      // x+: predicted along the chain, with fbar in place of the estimated disturbance.
+      Estimate start = before;
+      start(Order) = now;
+      const S drive = Chain::scaled_input_gain(this->input_gain(), time) * u;
+      const auto ahead = Chain::template predict<1>(Chain::scaled(start, time), Array<S, 1>{drive});
+      x = Chain::physical(ahead, S(S(1.0) / time)).template head<Order>();
+      const S change = rest_.set.nominal_model(x, u, S(t + time)) - now;
+      const S low = select(change < -rest_.set.change_bound, S(-rest_.set.change_bound), change);
+      const S limited = select(rest_.set.change_bound < low, rest_.set.change_bound, low);
+      const S sum = this->total_disturbance() + limited;
+      this->shift_disturbance(select(is_finite(sum), limited, S(0.0)));
+      ++rest_.sample;
+    }
   }
 
   struct Set {

@@ -13,6 +13,10 @@
 
 namespace esokit {
 
+namespace detail {
+struct GuardAccess;  // adapter/guarded_states.hpp
+}
+
 /// Base of PredictorCorrector: its data, and all members that only read them.
 ///
 /// @tparam Order n, order of the plant @tparam Extension m, extended states
