@@ -456,7 +456,16 @@ TEST(PlantModel, RefusesPartsThatMakeNoSense) {
             "model.resonators.frequency[0]: must be below half the sample rate");
   EXPECT_EQ(changed([](auto& s) { s.first_order[0] = 0.9e-5; }),
             "model.first_order[0]: must be at least a hundredth of sample_time");
-  EXPECT_EQ(changed([](auto& s) { s.plant.a(1, 1) = std::nan(""); }), "a[4]: must be finite");
+  EXPECT_EQ(changed([](auto& s) { s.plant.a(1, 1) = std::nan(""); }),
+            "model.plant.a[4]: must be finite");
+  EXPECT_EQ(changed([](auto& s) { s.plant.b(1) = std::nan(""); }),
+            "model.plant.b[1]: must be finite");
+  EXPECT_EQ(changed([](auto& s) { s.plant.c(2) = std::nan(""); }),
+            "model.plant.c[2]: must be finite");
+  EXPECT_EQ(changed([](auto& s) { s.plant.e(0) = std::nan(""); }),
+            "model.plant.e[0]: must be finite");
+  EXPECT_EQ(changed([](auto& s) { s.plant.dead_time = -1.0; }),
+            "model.plant.dead_time: must be finite and not negative");
 }
 
 }  // namespace model_plant_model_test

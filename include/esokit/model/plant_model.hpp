@@ -14,6 +14,7 @@
 #include <esokit/model/model_parts.hpp>
 #include <esokit/model/parts_shape.hpp>
 #include <limits>
+#include <string_view>
 
 namespace esokit {
 
@@ -69,7 +70,14 @@ requires(Parts.states > 0)  //
   static Expected<AugmentedModel, Error<S>> make(const Settings& settings, const S& input_gain,
                                                  const S& sample_time) {
     const auto& plant = settings.plant;
-    if (const auto ok = plant.check(); !ok) return ok.error();
+    if (const auto ok = plant.check(); !ok) {
+      Error<S> error = ok.error();
+      for (const char* field : {"model.plant.a", "model.plant.b", "model.plant.c", "model.plant.e",
+                                "model.plant.dead_time"}) {
+        if (std::string_view(field).substr(12) == error.field) error.field = field;
+      }
+      return error;
+    }
     Rules<S> rules;
     const int degree = plant.relative_degree();
     rules
