@@ -74,8 +74,8 @@ constexpr S least_certified_gain(const EqualSampledPoles<Size, S>& poles) noexce
 }
 
 /// k times a gain set.
-template <int Size, Scalar S, class Gain>
-constexpr Gain multiplied(Gain gain, const S& k) noexcept {
+template <int Size, Scalar S>
+constexpr ScaledGain<Size, S> multiplied(ScaledGain<Size, S> gain, const S& k) noexcept {
   for (S& value : gain) value = value * k;
   return gain;
 }
