@@ -467,6 +467,19 @@ TEST(ModelControllers, AllSettleOnTheReference) {
   EXPECT_LT(settled_error(own, -3.0, 2000), 1e-9);
 }
 
+// By it a predictive controller refuses a y whose estimates would overflow. The sensor's state is
+// the first of the model and the last of an estimate.
+TEST(ModelControllers, ProbesAnEstimateByRows) {
+  const Both observer = Both::make(both_config()).value();
+  for (int row = 0; row < Both::size; ++row) {
+    Both::State of_estimate{}, of_model{};
+    of_estimate[static_cast<std::size_t>(row)] = 3.0;
+    of_model[static_cast<std::size_t>(Both::PlantModel::state_of_row(row))] = 3.0;
+    EXPECT_GT(observer.finite_probe(of_estimate), 0.0);
+    EXPECT_EQ(observer.finite_probe(of_estimate), observer.model().finite_probe(of_model)) << row;
+  }
+}
+
 TEST(ModelControllers, PredictiveIsAdrcWithTheSameSamples) {
   const auto compare = [](auto predictive, auto adrc) {
     predictive.prepare(1.0);

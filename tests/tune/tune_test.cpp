@@ -862,6 +862,34 @@ TEST(TuneTest, SoftensOrderTwo) {
   EXPECT_EQ(two[0].name, "dearer");
 }
 
+// Of the same J first what computes less, then the observer without a covariance, then the margin.
+TEST(TuneTest, RanksEqualsByWhatAnUpdateCosts) {
+  const auto tuning = tune(servo(), {}).value();
+  const auto first_of = [&](const auto& change) {
+    std::vector<TunedDesign> two(2, tuning.designs.front());
+    two[0].family = two[1].family = TuneFamily::linear;
+    two[0].name = "changed";
+    change(two[0], two[1]);
+    esokit::detail::rank(two, 2);
+    return two[0].name == "changed";
+  };
+  EXPECT_FALSE(first_of([](TunedDesign& a, TunedDesign&) { a.operations += 1; }));
+  EXPECT_FALSE(first_of([](TunedDesign& a, TunedDesign&) { a.family = TuneFamily::filter; }));
+  // A covariance counts less than one operation, a margin less than either.
+  EXPECT_TRUE(first_of([](TunedDesign& a, TunedDesign& b) {
+    a.family = TuneFamily::filter;
+    b.operations += 1;
+  }));
+  EXPECT_FALSE(first_of([](TunedDesign& a, TunedDesign& b) {
+    a.family = TuneFamily::filter;
+    a.modulus_margin = 2.0 * b.modulus_margin;
+  }));
+  EXPECT_TRUE(
+      first_of([](TunedDesign& a, TunedDesign& b) { b.modulus_margin = 0.9 * a.modulus_margin; }));
+  EXPECT_FALSE(
+      first_of([](TunedDesign& a, TunedDesign& b) { a.modulus_margin = 0.9 * b.modulus_margin; }));
+}
+
 // A stated law that breaks the rule is refused, with the nearest that keeps it.
 TEST(TuneTest, NamesTheNearestThatKeepsTheRule) {
   const TuneModel model = servo();
