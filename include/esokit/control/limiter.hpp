@@ -56,8 +56,7 @@ class Limiter {
 
   /// The output that `command` would give; nothing is stored.
   [[nodiscard]] constexpr S clamp(const S& command) const noexcept {
-    const S above = select(command < low_, low_, command);
-    return select(high_ < above, high_, above);
+    return smaller(larger(command, low_), high_);
   }
 
   /// `u` within the magnitude limits, without the rate limit.
@@ -102,8 +101,8 @@ class Limiter {
     track(within(S(0.0)));
   }
 
-  static constexpr S smaller(const S& a, const S& b) noexcept { return select(b < a, b, a); }
-  static constexpr S larger(const S& a, const S& b) noexcept { return select(a < b, b, a); }
+  static constexpr S smaller(const S& a, const S& b) noexcept { return detail::lower_one(a, b); }
+  static constexpr S larger(const S& a, const S& b) noexcept { return detail::upper_one(a, b); }
 
   S lower_;
   S upper_;

@@ -108,6 +108,30 @@ constexpr T select(bool condition, T a, T b) noexcept {
   return condition ? a : b;
 }
 
+namespace detail {
+
+/// `a < b ? b : a` and `b < a ? b : a`: one instruction, whose first operand is b.
+/// @{
+template <class T>
+constexpr T upper_one(const T& a, const T& b) noexcept {
+  if constexpr (requires { T::larger_of(a, b); }) {
+    return T::larger_of(a, b);
+  } else {
+    return select(a < b, b, a);
+  }
+}
+template <class T>
+constexpr T lower_one(const T& a, const T& b) noexcept {
+  if constexpr (requires { T::smaller_of(a, b); }) {
+    return T::smaller_of(a, b);
+  } else {
+    return select(b < a, b, a);
+  }
+}
+/// @}
+
+}  // namespace detail
+
 /// True if every lane of a mask is set; a plain scalar has one lane.
 constexpr bool all(bool condition) noexcept { return condition; }
 
