@@ -45,6 +45,23 @@ struct PerLane {
   }
   /// @}
 
+  /// True if each lane holds the value; without a copy of it in memory.
+  ESOKIT_INLINE friend constexpr bool operator==(const PerLane& a, const T& value) noexcept
+      requires(std::has_unique_object_representations_v<T> && sizeof(T) <= 2) {
+    using Bits = std::conditional_t<sizeof(T) == 1, std::uint8_t, std::uint16_t>;
+    const auto words = std::bit_cast<Words>(a);
+    constexpr Word ones =
+        sizeof(Word) == sizeof(T) ? Word(1) : static_cast<Word>(static_cast<Word>(-1) / Bits(-1));
+    const auto same = static_cast<Word>(ones * std::bit_cast<Bits>(value));
+    Word differs = 0;
+    for (const Word& word : words) differs = static_cast<Word>(differs | (word ^ same));
+    return differs == 0;
+  }
+  constexpr PerLane& operator=(T value) noexcept {
+    values.fill(value);
+    return *this;
+  }
+
   /// True if all lanes are equal.
   ESOKIT_INLINE friend constexpr bool operator==(const PerLane& a, const PerLane& b) noexcept {
     if constexpr (std::has_unique_object_representations_v<PerLane>) {
