@@ -150,7 +150,11 @@ class DelayedInput : public NamedAdapter<DelayedInput<Observer, Capacity>, Obser
   /// Whether all lanes are at the same place and have the same delay.
   template <class O>
   [[nodiscard]] ESOKIT_INLINE bool lanes_agree() const noexcept {
-    return agree(rest_.newest) && agree(rest_.delay);
+    if constexpr (lane_count<S> == 1) {
+      return true;
+    } else {
+      return agree(rest_.newest) && agree(rest_.delay);
+    }
   }
   /// A step of the observer with the input of d samples ago; then u is in the line. False, and
   /// nothing has changed, if u is not finite or the step says so.

@@ -364,7 +364,7 @@ class Adrc {
 
   /// A sample, for a constant and for a moving reference.
   template <class Given>
-  S stepped(S y, Given reference) noexcept {
+  ESOKIT_INLINE S stepped(S y, Given reference) noexcept {
     return loop_.step(y, loop_.output(), asked(reference));
   }
 
@@ -407,7 +407,7 @@ class Adrc {
 
   /// u by the softened law, which is judged by it.
   template <class Given>
-  [[nodiscard]] S judged(const Given& given) noexcept {
+  [[nodiscard]] ESOKIT_COLD S judged(Given given) noexcept {
     S u = command(given);
     if (all(!soft_.on())) return u;
     if (const auto designed = soft_.slowness() <= S(1.0); records<S> || !all(designed)) {

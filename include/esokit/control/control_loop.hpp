@@ -209,6 +209,15 @@ class ControlLoop {
       (void)step_all(u, measured, law);
       return u;
     } else {
+      if constexpr (!Advanced && detail::LaneAccess::steps<Observer>) {
+        // What is seldom is called last, so that nothing has to be kept for later.
+        if (special_ || !detail::LaneAccess::advance(observer_)) [[unlikely]]
+          return step_seldom<false>(measured, drive, law);
+        if (!detail::LaneAccess::step(observer_, measured, drive)) [[unlikely]]
+          return step_seldom<true>(measured, drive, law);
+        status_ = StepStatus::ok;
+        return limited(law(false));
+      }
       if (special_) [[unlikely]] {
         observe_specially<Advanced>(measured, drive);
         return put_out(law);
@@ -353,6 +362,21 @@ class ControlLoop {
     if (mode_ == LoopMode::start_hold) set_mode(LoopMode::running);
     observe_specially<false>(measured, drive);
     requested_ = limiter_.last();
+  }
+
+  template <bool Advanced, class Law>
+  ESOKIT_COLD S step_seldom(S measured, S drive, Law law) noexcept {
+    if (special_) {
+      observe_specially<Advanced>(measured, drive);
+      return put_out(law);
+    }
+    const StepStatus status = observe<Advanced>(measured, drive);
+    status_ = status;
+    if (status != StepStatus::ok) {
+      after_trouble(measured);
+      return put_out(law);
+    }
+    return limited(law(false));
   }
 
   template <class Law>
