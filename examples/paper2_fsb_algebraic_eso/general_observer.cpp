@@ -203,7 +203,7 @@ int main(int argc, char** argv) {
                       4, true));
   report.remark(
       "Both observers start at zero, the plant does not. If the disturbance is a polynomial of "
-      "degree below m, the algebraic observer is exact from sample N - 1 = n + m - 1 on; what "
+      "degree below m, the algebraic observer is exact from sample N - 1 = n + m - 1 on. What "
       "remains is the rounding of the measurement, amplified n times by 1/T, which averages out. "
       "If it is of degree m, both observers end with the same lag, and the algebraic one starts "
       "without it.");
