@@ -45,16 +45,16 @@ class RateAxisOf {
         .positive("motor_lag", config.motor_lag)
         .not_negative("gyro_delay", config.gyro_delay)
         .positive("controller_bandwidth", config.controller_bandwidth)
-        .require(
+        .demand(
             config.gyro_delay <= MostDelay * config.sample_time,
             {"gyro_delay", config.gyro_delay, "must be at most MostDelay sample times, which is",
              -1, MostDelay * config.sample_time, true})
-        .require(config.controller_bandwidth <= by_motor,
-                 {"controller_bandwidth", config.controller_bandwidth,
-                  "must be at most 2.5 / motor_lag, which is", -1, by_motor, true})
-        .require(config.controller_bandwidth <= by_gyro,
-                 {"controller_bandwidth", config.controller_bandwidth,
-                  "must be at most 0.4 / (gyro_delay + sample_time), which is", -1, by_gyro, true});
+        .demand(config.controller_bandwidth <= by_motor,
+                {"controller_bandwidth", config.controller_bandwidth,
+                 "must be at most 2.5 / motor_lag, which is", -1, by_motor, true})
+        .demand(config.controller_bandwidth <= by_gyro,
+                {"controller_bandwidth", config.controller_bandwidth,
+                 "must be at most 0.4 / (gyro_delay + sample_time), which is", -1, by_gyro, true});
     if (!rules) return rules.error();
     const float observer_bandwidth = 2 * config.controller_bandwidth;
     typename Loop::Config loop;

@@ -205,10 +205,10 @@ TEST(VariableTime, EveryObserver) {
 
 /// A pendulum: fbar = -a sin y - b y'.
 struct Pendulum {
-  static constexpr esokit::PlantModelTraits traits{.checks = true};
+  static constexpr esokit::PlantModelTraits traits{.validates = true};
   double gravity{};
   double damping{};
-  [[nodiscard]] esokit::Check<double> check() const {
+  [[nodiscard]] esokit::Check<double> validate() const {
     return esokit::Rules<double>{}
         .finite("model.gravity", gravity)
         .finite("model.damping", damping);

@@ -110,8 +110,8 @@ TYPED_TEST(RulesOf, FirstBrokenOneIsTheErrorWhateverComesAfter) {
                              .finite("d", bad)
                              .invertible("e", S(0))
                              .above("f", S(0), S(1))
-                             .require(false, "g", S(0), "never")
-                             .require(false, {"h", S(0), "never", 1, S(2), true})
+                             .demand(false, "g", S(0), "never")
+                             .demand(false, {"h", S(0), "never", 1, S(2), true})
                              .all_of(Check<S>(Error<S>{"i", S(0), "never"}));
   ASSERT_FALSE(rules);
   EXPECT_EQ(said(rules), "c[5] = -4: must be finite and not negative");
@@ -140,10 +140,10 @@ TYPED_TEST(RulesOf, ListIsCheckedByElementAndNamesIt) {
 
 TYPED_TEST(RulesOf, OwnRuleHasWhatItSays) {
   using S = TypeParam;
-  EXPECT_EQ(said(Rules<S>{}.require(true, "a", S(1), "x")), "kept");
-  EXPECT_EQ(said(Rules<S>{}.require(false, "a", S(1), "must be another", 2)),
+  EXPECT_EQ(said(Rules<S>{}.demand(true, "a", S(1), "x")), "kept");
+  EXPECT_EQ(said(Rules<S>{}.demand(false, "a", S(1), "must be another", 2)),
             "a[2] = 1: must be another");
-  EXPECT_EQ(said(Rules<S>{}.require(false, {"a", S(1), "must be below", -1, S(0.5), true})),
+  EXPECT_EQ(said(Rules<S>{}.demand(false, {"a", S(1), "must be below", -1, S(0.5), true})),
             "a = 1: must be below 0.5");
 }
 

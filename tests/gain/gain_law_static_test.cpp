@@ -373,17 +373,17 @@ struct EvenPlain {
   double operator()(double) const { return 1; }
 };
 struct Checked : EvenPlain {
-  static constexpr esokit::EvenGainTraits traits{.checks = true};
-  [[nodiscard]] esokit::Check<double> check() const { return {}; }
+  static constexpr esokit::EvenGainTraits traits{.validates = true};
+  [[nodiscard]] esokit::Check<double> validate() const { return {}; }
 };
 struct CheckUndeclared : EvenPlain {
-  [[nodiscard]] esokit::Check<double> check() const { return {}; }
+  [[nodiscard]] esokit::Check<double> validate() const { return {}; }
 };
 struct CheckMissing : EvenPlain {
-  static constexpr esokit::EvenGainTraits traits{.checks = true};
+  static constexpr esokit::EvenGainTraits traits{.validates = true};
 };
 struct CheckIsABool : CheckMissing {
-  [[nodiscard]] bool check() const { return true; }
+  [[nodiscard]] bool validate() const { return true; }
 };
 struct Prepares : EvenPlain {
   static constexpr esokit::EvenGainTraits traits{.prepares = true};

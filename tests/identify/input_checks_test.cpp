@@ -49,7 +49,7 @@ TEST(GainBySize, TellsAnActuatorThatIsNotLinear) {
   const auto linear = studied(machine(straight));
   EXPECT_FALSE(linear.by_size.differ());
   EXPECT_NEAR(linear.by_size.knot, 0.5, 0.1);
-  for (const auto& part : {linear.by_size.small, linear.by_size.large}) {
+  for (const auto& part : {linear.by_size.below, linear.by_size.above}) {
     EXPECT_LT(std::abs(part.value - b0), part.half_width);
     EXPECT_LT(part.share(), 0.1);
   }
@@ -57,13 +57,13 @@ TEST(GainBySize, TellsAnActuatorThatIsNotLinear) {
 
   const auto saturated = studied(machine([](double u) { return std::clamp(u, -0.5, 0.5); }));
   EXPECT_TRUE(saturated.by_size.differ());
-  EXPECT_NEAR(saturated.by_size.small.value, b0, 0.1 * b0);
-  EXPECT_NEAR(saturated.by_size.large.value, 0, 0.15 * b0);
+  EXPECT_NEAR(saturated.by_size.below.value, b0, 0.1 * b0);
+  EXPECT_NEAR(saturated.by_size.above.value, 0, 0.15 * b0);
 
   const auto square = studied(machine([](double u) { return u * std::abs(u); }));
   EXPECT_TRUE(square.by_size.differ());
-  EXPECT_NEAR(square.by_size.small.value / b0, 0.5, 0.2);
-  EXPECT_NEAR(square.by_size.large.value / b0, 1.5, 0.3);
+  EXPECT_NEAR(square.by_size.below.value / b0, 0.5, 0.2);
+  EXPECT_NEAR(square.by_size.above.value / b0, 1.5, 0.3);
 
   // Of two levels there is nothing to tell.
   for (const double low : {-1.0, 0.0}) {
@@ -76,12 +76,12 @@ TEST(GainBySize, TellsAnActuatorThatIsNotLinear) {
 TEST(GainBySize, DiffersByAQuarterAndByMoreThanTheIntervals) {
   GainBySize found{1, {4, 0.5}, {2.9, 0.59}};
   EXPECT_TRUE(found.differ());
-  found.large.half_width = 0.61;
+  found.above.half_width = 0.61;
   EXPECT_FALSE(found.differ());
-  found.small.half_width = found.large.half_width = 0.01;
-  found.large.value = 3.01;
+  found.below.half_width = found.above.half_width = 0.01;
+  found.above.value = 3.01;
   EXPECT_FALSE(found.differ());
-  found.large.value = 2.99;
+  found.above.value = 2.99;
   EXPECT_TRUE(found.differ());
   found = {1, {-2.99, 0.01}, {-4, 0.01}};
   EXPECT_TRUE(found.differ());

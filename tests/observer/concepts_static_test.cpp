@@ -656,14 +656,14 @@ struct ModelOfYours {
   S operator()(const esokit::Vector<S, 3>& z) const { return -z(0); }
 };
 struct ModelThatChecks : ModelOfYours {
-  static constexpr esokit::PlantModelTraits traits{.checks = true};
-  [[nodiscard]] Check<S> check() const { return {}; }
+  static constexpr esokit::PlantModelTraits traits{.validates = true};
+  [[nodiscard]] Check<S> validate() const { return {}; }
 };
 struct ModelCheckUndeclared : ModelOfYours {
-  [[nodiscard]] Check<S> check() const { return {}; }
+  [[nodiscard]] Check<S> validate() const { return {}; }
 };
 struct ModelCheckMissing : ModelOfYours {
-  static constexpr esokit::PlantModelTraits traits{.checks = true};
+  static constexpr esokit::PlantModelTraits traits{.validates = true};
 };
 struct ModelOfNothing {
   S operator()() const { return 0; }

@@ -12,13 +12,13 @@ namespace esokit_test {
 /// fbar = -c v / (1 + abs(v)), v = y^(Row).
 template <int Row, class S>
 struct Friction {
-  static constexpr esokit::PlantModelTraits traits{.checks = true};
+  static constexpr esokit::PlantModelTraits traits{.validates = true};
   template <class T>
   using with_scalar = Friction<Row, T>;
 
   S coefficient{};  ///< c
 
-  [[nodiscard]] esokit::Check<S> check() const {
+  [[nodiscard]] esokit::Check<S> validate() const {
     return esokit::Rules<S>{}.finite("model.coefficient", coefficient);
   }
 

@@ -34,8 +34,8 @@ class ResonatorModel {
                                                                  const S& sample_time) {
     esokit::Rules<S> rules;
     rules.positive("model.frequency", settings.frequency)
-        .require(settings.frequency * sample_time < S(3.1), "model.frequency", settings.frequency,
-                 "must be below half the sample rate");
+        .demand(settings.frequency * sample_time < S(3.1), "model.frequency", settings.frequency,
+                "must be below half the sample rate");
     if (!rules) return rules.error();
     return ResonatorModel(settings.frequency, input_gain, sample_time);
   }

@@ -1254,14 +1254,14 @@ TEST(TuneModelTest, RefusesWhatIsTooFarApart) {
   for (const auto& c : cases) {
     TuneModel model = plain(1, 1e9);
     model.*c.member = c.good;
-    EXPECT_EQ(esokit_test::refusal(model.check()), "accepted") << c.rule;
+    EXPECT_EQ(esokit_test::refusal(model.validate()), "accepted") << c.rule;
     model.*c.member = c.bad;
-    EXPECT_EQ(esokit_test::refusal(model.check()), c.rule);
+    EXPECT_EQ(esokit_test::refusal(model.validate()), c.rule);
   }
   const auto swinging = [](const esokit::KnownSinusoid& swing) {
     TuneModel model = plain(1);
     model.sinusoids = {swing};
-    return esokit_test::refusal(model.check());
+    return esokit_test::refusal(model.validate());
   };
   EXPECT_EQ(swinging({1e-6, 1e60, 0.0}), "accepted");
   EXPECT_EQ(swinging({0.9e-6, 1.0, 0.0}),
@@ -1271,11 +1271,11 @@ TEST(TuneModelTest, RefusesWhatIsTooFarApart) {
   EXPECT_EQ(swinging({1.0, 1.1e60, 0.0}), "sinusoids.amplitude[0]: is too large: use another unit");
   TuneModel two = plain(1);
   two.sinusoids.resize(2);
-  EXPECT_EQ(esokit_test::refusal(two.check()), "sinusoids: must be one at most");
+  EXPECT_EQ(esokit_test::refusal(two.validate()), "sinusoids: must be one at most");
   for (const double gain : {1e-20, -1e20, 0.9e-20, -1.1e20}) {
     TuneModel model = plain(1);
     model.input_gain = {gain, 0.0};
-    EXPECT_EQ(esokit_test::refusal(model.check()),
+    EXPECT_EQ(esokit_test::refusal(model.validate()),
               gain == 1e-20 || gain == -1e20
                   ? "accepted"
                   : "input_gain: must be between 1e-20 and 1e20: use another unit");

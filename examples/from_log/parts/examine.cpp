@@ -113,9 +113,9 @@ void sound_alarms(const Settings& settings, const Input& input, Findings& all) {
   const double b0 = found.input_gain.value;
   if (const auto& sizes = found.by_size; sizes.differ()) {
     all.alarms.push_back(
-        {"large-u", "b0 is " + number_text(sizes.small.value, 3) + " for u (" + input.u +
+        {"large-u", "b0 is " + number_text(sizes.below.value, 3) + " for u (" + input.u +
                         ") up to " + number_text(sizes.knot, 3) + " and " +
-                        number_text(sizes.large.value, 3) +
+                        number_text(sizes.above.value, 3) +
                         " beyond. Does the actuator saturate, stick, or act as the square of u? "
                         "Record the u that it held, or correct u by its curve."});
   }

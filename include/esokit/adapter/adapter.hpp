@@ -210,7 +210,7 @@ class NamedAdapter : public Adapter<Observer> {
   /// @return the adapter, with its observer at rest at zero, or an error that names the field
   static Expected<Self, Error<scalar_type>> make(const Config& config) {
     detail::refuse_packs<scalar_type>();
-    if (Check<scalar_type> ok = Self::check(config); !ok) return ok.error();
+    if (Check<scalar_type> ok = Self::validate(config); !ok) return ok.error();
     const auto observer = Observer::make(config.observer);
     if (!observer) return observer.error();
     return Self(*observer, config);

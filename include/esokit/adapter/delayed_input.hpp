@@ -37,7 +37,7 @@ class DelayedInput : public NamedAdapter<DelayedInput<Observer, Capacity>, Obser
   using Base::observer_;
   static_assert(Capacity >= 1, "esokit: a delay line needs a capacity of at least 1");
   using S = typename Observer::scalar_type;
-  using Status = StatusOf<S>;
+  using StatusType = StatusOf<S>;
 
  public:
   /// The same with another scalar. Not one that records, as the place in the line changes.
@@ -54,13 +54,13 @@ class DelayedInput : public NamedAdapter<DelayedInput<Observer, Capacity>, Obser
   }();
 
   /// One sample. @param y measurement @param u_applied u[k], not delayed; the delay is applied here
-  Status update(S y, S u_applied) noexcept {
+  StatusType update(S y, S u_applied) noexcept {
     const StepStatus status = push(u_applied);
     return status | observer_.update(y, delayed());
   }
 
   /// Time update only, see PredictorCorrector::predict.
-  Status predict(S u_applied) noexcept {
+  StatusType predict(S u_applied) noexcept {
     const StepStatus status = push(u_applied);
     return status | observer_.predict(delayed());
   }
@@ -88,11 +88,11 @@ class DelayedInput : public NamedAdapter<DelayedInput<Observer, Capacity>, Obser
     rest_.delay = config.delay;
   }
 
-  static Check<S> check(const DelayedInputConfig<Observer>& config) {
-    return Rules<S>{}.require(0 <= config.delay && config.delay <= Capacity,
-                              {"delay", static_cast<S>(config.delay),
-                               "must be 0 up to the capacity of the delay line, which is", -1,
-                               static_cast<S>(Capacity), true});
+  static Check<S> validate(const DelayedInputConfig<Observer>& config) {
+    return Rules<S>{}.demand(0 <= config.delay && config.delay <= Capacity,
+                             {"delay", static_cast<S>(config.delay),
+                              "must be 0 up to the capacity of the delay line, which is", -1,
+                              static_cast<S>(Capacity), true});
   }
 
   /// Keeps the inputs in the delay line.
@@ -124,7 +124,7 @@ class DelayedInput : public NamedAdapter<DelayedInput<Observer, Capacity>, Obser
     });
   }
   template <class O = Observer>
-  Status update_advanced(const S& y, const S& u) noexcept {
+  StatusType update_advanced(const S& y, const S& u) noexcept {
     const StepStatus status = push(u);
     return status | detail::LaneAccess::update_advanced(observer_, y, delayed());
   }
@@ -139,7 +139,7 @@ class DelayedInput : public NamedAdapter<DelayedInput<Observer, Capacity>, Obser
     });
   }
   template <class O = Observer>
-  Status predict_advanced(const S& u) noexcept {
+  StatusType predict_advanced(const S& u) noexcept {
     const StepStatus status = push(u);
     return status | detail::LaneAccess::predict_advanced(observer_, delayed());
   }

@@ -340,19 +340,19 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     renew_bound();
   }
 
-  static Check<S> check(const Config& config) {
+  static Check<S> validate(const Config& config) {
     return Rules<S>{}
         .invertible("input_gain", chain_config<Observer>(config.observer).input_gain)
         .not_negative("disturbance_bound", config.disturbance_bound)
-        .require(0 <= config.release_samples && config.release_samples <= 65000, "release_samples",
-                 static_cast<S>(config.release_samples), "must be 0 .. 65000")
+        .demand(0 <= config.release_samples && config.release_samples <= 65000, "release_samples",
+                static_cast<S>(config.release_samples), "must be 0 .. 65000")
         .not_negative("leak_time", config.leak_time)
-        .require(gates || !(config.leak_time > S(0)), "leak_time", config.leak_time,
-                 "must be 0 with an extension above 1 or a varying sample time")
-        .require(!(config.leak_time > S(0)) ||
-                     Guards::leak_share(config) >= std::numeric_limits<S>::epsilon(),
-                 "leak_time", config.leak_time,
-                 "is too long: what leaks in one sample is below the rounding of the scalar");
+        .demand(gates || !(config.leak_time > S(0)), "leak_time", config.leak_time,
+                "must be 0 with an extension above 1 or a varying sample time")
+        .demand(!(config.leak_time > S(0)) ||
+                    Guards::leak_share(config) >= std::numeric_limits<S>::epsilon(),
+                "leak_time", config.leak_time,
+                "is too long: what leaks in one sample is below the rounding of the scalar");
   }
 
   /// b0 of the config. (Of a model with an actuator input_gain() is b0 / tau.)

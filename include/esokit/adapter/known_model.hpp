@@ -14,7 +14,7 @@ namespace esokit {
 /// What a known model can do besides fbar, declared in a member `static constexpr PlantModelTraits
 /// traits{..}`.
 struct PlantModelTraits {
-  bool checks = false;  ///< `check() const` gives the error of a bad parameter, as a Check
+  bool validates = false;  ///< `validate() const` gives the error of a bad parameter, as a Check
 };
 
 /// A known part of y^(n): fbar(estimate), noexcept, in the unit of y^(n), a function of y ..
@@ -24,9 +24,9 @@ concept PlantModel = std::copyable<Model> &&
     requires(const Model& model, const typename Observer::Estimate& estimate) {
   { model(estimate) } -> std::convertible_to<typename Observer::scalar_type>;
 } && DeclaresTraits<Model, PlantModelTraits> && detail::as_declared(
-    detail::declared_traits<Model, PlantModelTraits>.checks, detail::names_check<Model>,
+    detail::declared_traits<Model, PlantModelTraits>.validates, detail::names_validate<Model>,
     requires(const Model& model) {
-      { model.check() } -> std::same_as<Check<typename Observer::scalar_type>>;
+      { model.validate() } -> std::same_as<Check<typename Observer::scalar_type>>;
     });
 
 /// Config of KnownModel.
@@ -66,7 +66,7 @@ class KnownModel : public NamedAdapter<KnownModel<Observer, Model>, Observer,
   friend struct detail::RecordAccess;
   using Base::observer_;
   using S = typename Observer::scalar_type;
-  using Status = StatusOf<S>;
+  using StatusType = StatusOf<S>;
   static_assert(!observer_traits<Observer>.delays_input,
                 "esokit: put DelayedInput around KnownModel, not inside it: fbar is not delayed");
 
@@ -90,22 +90,22 @@ class KnownModel : public NamedAdapter<KnownModel<Observer, Model>, Observer,
 
   /// One sample, see PredictorCorrector::update. `u_applied` is the u that the actuator held,
   /// without the contribution of the model.
-  Status update(S y, S u_applied) noexcept {
+  StatusType update(S y, S u_applied) noexcept {
     const S input = accepted(u_applied);
     return report(u_applied) | observer_.update(y, input);
   }
 
   /// Time update only, see PredictorCorrector::predict.
-  Status predict(S u_applied) noexcept {
+  StatusType predict(S u_applied) noexcept {
     const S input = accepted(u_applied);
     return report(u_applied) | observer_.predict(input);
   }
 
   /// Restarts at (y, 0, .., 0), with d zero, as after too long a gap.
-  Status reset(S y) noexcept { return observer_.reset(y); }
+  StatusType reset(S y) noexcept { return observer_.reset(y); }
 
   /// Restarts at a given estimate, whose row n is fbar + d.
-  Status reset(const Estimate& state) noexcept { return observer_.reset(without_known(state)); }
+  StatusType reset(const Estimate& state) noexcept { return observer_.reset(without_known(state)); }
 
   /// (y, .., y^(n-1), fbar + d, d', .., d^(m-1)), N x 1, physical units.
   [[nodiscard]] Estimate estimate() const noexcept {
@@ -177,9 +177,9 @@ class KnownModel : public NamedAdapter<KnownModel<Observer, Model>, Observer,
     return {};
   }
 
-  static Check<S> check(const KnownModelConfig<Observer, Model>& config) {
-    if constexpr (detail::declared_traits<Model, PlantModelTraits>.checks) {
-      return config.model.check();
+  static Check<S> validate(const KnownModelConfig<Observer, Model>& config) {
+    if constexpr (detail::declared_traits<Model, PlantModelTraits>.validates) {
+      return config.model.validate();
     } else {
       return {};
     }
@@ -204,7 +204,7 @@ class KnownModel : public NamedAdapter<KnownModel<Observer, Model>, Observer,
     return rest_.applied_input + known_part() * rest_.inverse_gain;
   }
 
-  static Status report(const S& u) noexcept {
+  static StatusType report(const S& u) noexcept {
     return all(is_finite(u)) ? StepStatus::ok : StepStatus::input_rejected;
   }
 

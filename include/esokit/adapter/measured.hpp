@@ -189,14 +189,14 @@ class Measured : public NamedAdapter<Measured<Observer, Count, Delay>, Observer,
     return {};
   }
 
-  static Check<S> check(const Settings& config) {
+  static Check<S> validate(const Settings& config) {
     const S time = chain_config<Observer>(config.observer).sample_time;
     Rules<S> rules;
     for (int i = 0; i < Count; ++i) {
-      rules.all_of(Path::check(config.inputs[static_cast<std::size_t>(i)], time, i));
+      rules.all_of(Path::validate(config.inputs[static_cast<std::size_t>(i)], time, i));
     }
-    return rules.require(0 <= config.most_lost && config.most_lost <= 65535, "most_lost",
-                         static_cast<S>(config.most_lost), "must be 0 .. 65535");
+    return rules.demand(0 <= config.most_lost && config.most_lost <= 65535, "most_lost",
+                        static_cast<S>(config.most_lost), "must be 0 .. 65535");
   }
 
   /// The w number `i` to be used, by the rule for lost ones.

@@ -90,15 +90,15 @@ class OutlierGate
         running_factor_(config.running_factor),
         most_in_a_row_(static_cast<std::uint16_t>(config.most_in_a_row)) {}
 
-  static Check<S> check(const OutlierGateConfig<Observer>& config) {
+  static Check<S> validate(const OutlierGateConfig<Observer>& config) {
     return Rules<S>{}
         .not_negative("threshold", config.threshold)
         .not_negative("running_factor", config.running_factor)
-        .require(!(config.running_factor > S(0)) || config.threshold > S(0), "threshold",
-                 config.threshold,
-                 "must be positive if running_factor is: without noise nothing would pass")
-        .require(1 <= config.most_in_a_row && config.most_in_a_row <= 65000, "most_in_a_row",
-                 static_cast<S>(config.most_in_a_row), "must be 1 .. 65000");
+        .demand(!(config.running_factor > S(0)) || config.threshold > S(0), "threshold",
+                config.threshold,
+                "must be positive if running_factor is: without noise nothing would pass")
+        .demand(1 <= config.most_in_a_row && config.most_in_a_row <= 65000, "most_in_a_row",
+                static_cast<S>(config.most_in_a_row), "must be 1 .. 65000");
   }
 
   void take(const OutlierGate& fresh) noexcept {

@@ -179,7 +179,7 @@ class WrappedOutput
   WrappedOutput(const Observer& observer, const WrappedOutputConfig<Observer>& config) noexcept
       : Base(observer), period_(config.period), inverse_period_(S(1) / config.period) {}
 
-  static Check<S> check(const WrappedOutputConfig<Observer>& config) {
+  static Check<S> validate(const WrappedOutputConfig<Observer>& config) {
     return Rules<S>{}.positive("period", config.period).invertible("period", config.period);
   }
 

@@ -202,7 +202,7 @@ std::vector<double> law_weights(const Gains& gains, double input_gain) {
 }
 
 inline Check<double> measured_every_time(int divider) {
-  return Rules<double>{}.require(
+  return Rules<double>{}.demand(
       divider == 1, "measurement_divider", divider,
       "must be 1: the analysis needs a loop that is the same at every sample");
 }
@@ -246,11 +246,11 @@ requires detail::SaysObserver<Observer> Expected<LinearController, Error<double>
   const auto law_gain = static_cast<double>(parts.law.input_gain());
   using ObserverScalar = typename Observer::scalar_type;
   Rules<double> rules;
-  rules.require(detail::same_as_given<ObserverScalar, S>(gain, law_gain),
-                {"input_gain", observer.input_gain,
-                 error_based ? "of the observer must be minus that of the law, which is"
-                             : "of the observer must be that of the law, which is",
-                 -1, law_gain, true});
+  rules.demand(detail::same_as_given<ObserverScalar, S>(gain, law_gain),
+               {"input_gain", observer.input_gain,
+                error_based ? "of the observer must be minus that of the law, which is"
+                            : "of the observer must be that of the law, which is",
+                -1, law_gain, true});
   if (!rules) return rules.error();
   return detail::feedback_of(observer, detail::law_weights(parts.law.gains(), law_gain),
                              error_based);
@@ -294,12 +294,13 @@ template <class... Observers>
 requires(detail::SaysObserver<Observers>&&...)  //
     LinearController linear_controller(const MimoAdrc<Observers...>& controller) {
   std::vector<LinearController> channels;
-  const auto add = [&]<std::size_t... I>(std::index_sequence<I...>) {
+  const auto add = [&]<std::size_t... Index>(std::index_sequence<Index...>) {
     (channels.push_back(detail::feedback_of(
-         linear_observer(controller.template observer<static_cast<int>(I)>()),
+         linear_observer(controller.template observer<static_cast<int>(Index)>()),
          detail::law_weights(
-             controller.template gains<static_cast<int>(I)>(),
-             static_cast<double>(controller.template observer<static_cast<int>(I)>().input_gain())),
+             controller.template gains<static_cast<int>(Index)>(),
+             static_cast<double>(
+                 controller.template observer<static_cast<int>(Index)>().input_gain())),
          false)),
      ...);
   };

@@ -30,18 +30,18 @@ inline Check<double> output_covariance(const SystemView& system,
     rules.not_negative("input", input(i, i), i);
     for (int j = 0; j < input.rows; ++j) {
       const double value = input(i, j);
-      rules.require(is_finite(value) && value == input(j, i) &&
-                        value * value <= input(i, i) * input(j, j) * (1.0 + 1e-12),
-                    "input", value,
-                    "must be a covariance matrix: symmetric and positive semidefinite", i);
+      rules.demand(is_finite(value) && value == input(j, i) &&
+                       value * value <= input(i, i) * input(j, j) * (1.0 + 1e-12),
+                   "input", value,
+                   "must be a covariance matrix: symmetric and positive semidefinite", i);
     }
   }
   if (!rules) return rules.error();
   if (!system.sampled()) {
     for (int i = 0; i < system.outputs(); ++i) {
       const double direct = quadratic(system.d, input, i, i);
-      rules.require(!(direct > 0.0), "output", direct,
-                    "receives continuous white noise directly: its variance is infinite", i);
+      rules.demand(!(direct > 0.0), "output", direct,
+                   "receives continuous white noise directly: its variance is infinite", i);
     }
     if (!rules) return rules.error();
   }
@@ -56,8 +56,8 @@ inline Check<double> output_covariance(const SystemView& system,
   for (int i = 0; i < system.outputs(); ++i) {
     for (int j = 0; j < system.outputs(); ++j) {
       result(i, j) = quadratic(system.c, {p, n}, i, j) + quadratic(system.d, input, i, j);
-      rules.require(is_finite(result(i, j)), "output", result(i, j),
-                    "has a covariance that the scalar cannot hold", i);
+      rules.demand(is_finite(result(i, j)), "output", result(i, j),
+                   "has a covariance that the scalar cannot hold", i);
     }
   }
   return rules;

@@ -43,7 +43,7 @@ inline std::optional<Margin> refine_delay(const DelayedLoopGain& loop, double fr
   for (int i = 0; i < 40; ++i) {
     const std::complex<double> f = loop.log_minus(frequency, delay);
     if (!is_finite(f.real()) || !is_finite(f.imag())) return std::nullopt;
-    if (std::abs(f) < 1e-12) return Margin{delay, frequency};
+    if ((std::abs)(f) < 1e-12) return Margin{delay, frequency};
     const double dw = (frequency > 0.5 * nyquist ? -1e-7 : 1e-7) * frequency;
     // Towards the middle of the sample, because the slope changes at whole samples.
     const double position = delay / T - std::floor(delay / T);
@@ -56,7 +56,7 @@ inline std::optional<Margin> refine_delay(const DelayedLoopGain& loop, double fr
     if (!is_finite(step_w) || !is_finite(step_t)) return std::nullopt;
     step_w = std::clamp(step_w, -0.2 * frequency, 0.2 * frequency);
     step_t = std::clamp(step_t, -T, T);
-    frequency = std::min(frequency + step_w, nyquist);
+    frequency = (std::min)(frequency + step_w, nyquist);
     delay += step_t;
     if (delay < 0.0) delay = 0.0;
   }
@@ -68,8 +68,8 @@ template <class Response, class Visit>
 void gain_crossings(const Response& response, const ScanRange& range, Visit&& visit) {
   scan(response, range,
        [&](double w1, std::complex<double> l1, double w2, std::complex<double> l2) {
-         if ((std::abs(l1) < 1.0) == (std::abs(l2) < 1.0)) return;
-         const double w = bisect([&](double x) { return std::abs(response(x)) - 1.0; }, w1, w2);
+         if (((std::abs)(l1) < 1.0) == ((std::abs)(l2) < 1.0)) return;
+         const double w = bisect([&](double x) { return (std::abs)(response(x)) - 1.0; }, w1, w2);
          visit(w, response(w));
        });
 }
@@ -101,8 +101,8 @@ inline Margin continuous_delay_margin(const Loop& loop, int channel) {
 inline Expected<Margin, Error<double>> delay_margin(const Loop& loop, int channel = 0) {
   Rules<double> rules;
   rules.all_of(loop.check_channel("channel", channel))
-      .require(loop.stable(), "stability_abscissa", loop.stability_abscissa(),
-               detail::unstable_loop_rule);
+      .demand(loop.stable(), "stability_abscissa", loop.stability_abscissa(),
+              detail::unstable_loop_rule);
   if (!rules) return rules.error();
   const double T = loop.sample_time();
   if (!(T > 0.0)) return detail::continuous_delay_margin(loop, channel);

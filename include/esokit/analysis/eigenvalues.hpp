@@ -17,7 +17,7 @@ inline void to_hessenberg(DenseView<std::complex<double>> h) noexcept {
   for (int m = 1; m + 1 < n; ++m) {
     int pivot = m;
     for (int i = m + 1; i < n; ++i) {
-      if (std::abs(h(i, m - 1)) > std::abs(h(pivot, m - 1))) pivot = i;
+      if ((std::abs)(h(i, m - 1)) > (std::abs)(h(pivot, m - 1))) pivot = i;
     }
     if (pivot != m) {
       for (int j = 0; j < n; ++j) std::swap(h(m, j), h(pivot, j));
@@ -42,7 +42,7 @@ inline std::complex<double> wilkinson_shift(std::complex<double> h11, std::compl
   const std::complex<double> root = std::sqrt(half * half + product);
   const std::complex<double> one = half + root;
   const std::complex<double> other = half - root;
-  const std::complex<double> larger = std::abs(one) > std::abs(other) ? one : other;
+  const std::complex<double> larger = (std::abs)(one) > (std::abs)(other) ? one : other;
   return larger == 0.0 ? h22 : h22 - product / larger;
 }
 
@@ -50,24 +50,24 @@ inline std::complex<double> wilkinson_shift(std::complex<double> h11, std::compl
 /// updated, because only eigenvalues are needed.
 inline void qr_step(DenseView<std::complex<double>> h, int low, int high,
                     std::complex<double> shift) noexcept {
-  using Complex = std::complex<double>;
+  using ComplexNumber = std::complex<double>;
   // The rotation of rows k, k + 1 is applied to the columns one step later.
   double c_before = 0.0;
-  Complex s_before = 0.0;
+  ComplexNumber s_before = 0.0;
   for (int i = low; i <= high; ++i) h(i, i) -= shift;
   for (int k = low; k <= high; ++k) {
     double c = 1.0;
-    Complex s = 0.0;
+    ComplexNumber s = 0.0;
     if (k < high) {
-      const double size = std::hypot(std::abs(h(k, k)), std::abs(h(k + 1, k)));
+      const double size = std::hypot((std::abs)(h(k, k)), (std::abs)(h(k + 1, k)));
       if (size > 0.0) {
-        const double diagonal = std::abs(h(k, k));
-        const Complex phase = diagonal > 0.0 ? h(k, k) / diagonal : Complex(1.0);
+        const double diagonal = (std::abs)(h(k, k));
+        const ComplexNumber phase = diagonal > 0.0 ? h(k, k) / diagonal : ComplexNumber(1.0);
         c = diagonal / size;
         s = phase * std::conj(h(k + 1, k)) / size;
         for (int j = k; j <= high; ++j) {
-          const Complex upper = h(k, j);
-          const Complex lower = h(k + 1, j);
+          const ComplexNumber upper = h(k, j);
+          const ComplexNumber lower = h(k + 1, j);
           h(k, j) = c * upper + s * lower;
           h(k + 1, j) = -std::conj(s) * upper + c * lower;
         }
@@ -75,8 +75,8 @@ inline void qr_step(DenseView<std::complex<double>> h, int low, int high,
     }
     if (k > low) {
       for (int i = low; i <= k; ++i) {
-        const Complex left = h(i, k - 1);
-        const Complex right = h(i, k);
+        const ComplexNumber left = h(i, k - 1);
+        const ComplexNumber right = h(i, k);
         h(i, k - 1) = c_before * left + std::conj(s_before) * right;
         h(i, k) = -s_before * left + c_before * right;
       }
@@ -93,7 +93,7 @@ inline bool eigenvalues(DenseView<std::complex<double>> h, std::complex<double>*
   const int n = h.rows;
   double size = 0.0;
   for (int j = 0; j < n; ++j) {
-    for (int i = 0; i < n; ++i) size += std::abs(h(i, j));
+    for (int i = 0; i < n; ++i) size += (std::abs)(h(i, j));
   }
   if (!is_finite(size)) return false;
   to_hessenberg(h);
@@ -102,8 +102,8 @@ inline bool eigenvalues(DenseView<std::complex<double>> h, std::complex<double>*
   while (high >= 0) {
     int low = high;
     for (; low > 0; --low) {
-      const double beside = std::abs(h(low, low)) + std::abs(h(low - 1, low - 1));
-      if (std::abs(h(low, low - 1)) <= 1e-16 * (beside > 0.0 ? beside : size)) break;
+      const double beside = (std::abs)(h(low, low)) + (std::abs)(h(low - 1, low - 1));
+      if ((std::abs)(h(low, low - 1)) <= 1e-16 * (beside > 0.0 ? beside : size)) break;
     }
     if (low > 0) h(low, low - 1) = 0.0;
     if (low == high) {
@@ -116,7 +116,7 @@ inline bool eigenvalues(DenseView<std::complex<double>> h, std::complex<double>*
     std::complex<double> shift =
         wilkinson_shift(h(high - 1, high - 1), h(high - 1, high), h(high, high - 1), h(high, high));
     // An exceptional shift, to leave a cycle.
-    if (steps % 20 == 0) shift += std::abs(h(high, high - 1));
+    if (steps % 20 == 0) shift += (std::abs)(h(high, high - 1));
     qr_step(h, low, high, shift);
   }
   return true;

@@ -46,7 +46,7 @@ struct ErrorBound {
       const EigenMatrix<double, Size>& initial, double excess = 0.1) const {
     Rules<double> rules;
     rules.positive("excess", excess)
-        .require(level > 0.0, "level", level, "must be positive: a bound of zero is never reached")
+        .demand(level > 0.0, "level", level, "must be positive: a bound of zero is never reached")
         .finite("initial", initial);
     if (!rules) return rules.error();
     const double over = (scaled_norm(initial) - level) / (excess * level);
@@ -113,8 +113,8 @@ Expected<ErrorBound<Size>, Error<double>> bound_from(const LyapunovMatrix<Size>&
   double sum = bound.gamma + bound.level + bound.rate;
   for (const double each : bound.ultimate()) sum += each;
   Rules<double> rules;
-  rules.require(is_finite(sum), "observer_bandwidth", bandwidth,
-                "gives with these sources a bound that the scalar cannot hold");
+  rules.demand(is_finite(sum), "observer_bandwidth", bandwidth,
+               "gives with these sources a bound that the scalar cannot hold");
   if (!rules) return rules.error();
   return bound;
 }
@@ -132,7 +132,7 @@ Expected<ErrorBound<Size>, Error<double>> bound_between(const EigenMatrix<double
                                                                 scaled_error_matrix<Size>(gain2)};
   const auto lyapunov = common_lyapunov_matrix<Size>(modes);
   if (!lyapunov) return lyapunov.error();
-  const double gain = std::max(gain1.norm(), gain2.norm());
+  const double gain = (std::max)(gain1.norm(), gain2.norm());
   return bound_from(
       *lyapunov, bandwidth,
       sources.disturbance_rate + std::pow(bandwidth, Size) * gain * sources.measurement_noise);
@@ -263,9 +263,9 @@ Expected<ErrorBound<Size>, Error<double>> nonlinear_error_bound(const GainRange&
                                                                 const ErrorSources& sources) {
   Rules<double> rules;
   rules.positive("gain_min", setting.gain_min)
-      .require(is_finite(setting.gain_max) && setting.gain_max >= setting.gain_min,
-               {"gain_max", setting.gain_max, "must be finite and not below gain_min", -1,
-                setting.gain_min, true});
+      .demand(is_finite(setting.gain_max) && setting.gain_max >= setting.gain_min,
+              {"gain_max", setting.gain_max, "must be finite and not below gain_min", -1,
+               setting.gain_min, true});
   if (!rules) return rules.error();
   const EigenMatrix<double, Size> gain = detail::binomial_gain<Size>();
   return detail::bound_between<Size>(setting.gain_min * gain, setting.gain_max * gain,

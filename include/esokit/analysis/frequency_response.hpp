@@ -26,21 +26,21 @@ inline std::complex<double> frequency_operator(double frequency, double sample_t
 template <int States, int Inputs, int Outputs>
 EigenMatrix<std::complex<double>, Outputs, Inputs> evaluate(
     const LinearSystem<States, Inputs, Outputs>& system, std::complex<double> value) {
-  using Complex = std::complex<double>;
-  EigenMatrix<Complex, States, States> pencil;
-  EigenMatrix<Complex, States, Inputs> x;
+  using ComplexNumber = std::complex<double>;
+  EigenMatrix<ComplexNumber, States, States> pencil;
+  EigenMatrix<ComplexNumber, States, Inputs> x;
   for (int j = 0; j < States; ++j) {
     for (int i = 0; i < States; ++i) pencil(i, j) = -system.a(i, j);
     pencil(j, j) += value;
     for (int i = 0; i < Inputs; ++i) x(j, i) = system.b(j, i);
   }
   // Eigen stores row vectors by rows, which for a vector is the same.
-  solve_in_place(DenseView<Complex>{pencil.data(), States},
-                 DenseView<Complex>{x.data(), States, Inputs});
-  EigenMatrix<Complex, Outputs, Inputs> response;
+  solve_in_place(DenseView<ComplexNumber>{pencil.data(), States},
+                 DenseView<ComplexNumber>{x.data(), States, Inputs});
+  EigenMatrix<ComplexNumber, Outputs, Inputs> response;
   for (int i = 0; i < Outputs; ++i) {
     for (int j = 0; j < Inputs; ++j) {
-      Complex sum = system.d(i, j);
+      ComplexNumber sum = system.d(i, j);
       for (int k = 0; k < States; ++k) sum += system.c(i, k) * x(k, j);
       response(i, j) = sum;
     }
@@ -100,7 +100,7 @@ inline Check<double> check_frequency(double frequency, double sample_time) {
   const double nyquist = std::numbers::pi / sample_time;
   return Rules<double>{}
       .not_negative("frequency", frequency)
-      .require(
+      .demand(
           !(sample_time > 0.0 && frequency > nyquist * (1.0 + 1e-12)),
           {"frequency", frequency, "must not be above the Nyquist frequency", -1, nyquist, true});
 }
@@ -171,12 +171,12 @@ Expected<Bode<static_cast<int>(Count)>, Error<double>> bode(const std::array<dou
   for (std::size_t i = 0; i < Count; ++i) {
     const Expected<std::complex<double>, Error<double>> value = response(grid[i]);
     if (!value) return value.error();
-    curve.magnitude[i] = std::abs(*value);
+    curve.magnitude[i] = (std::abs)(*value);
     curve.decibel[i] = 20.0 * std::log10(curve.magnitude[i]);
     curve.phase[i] = std::arg(*value);
     if (i == 0) continue;
     const double turns = (curve.phase[i] - curve.phase[i - 1]) / (2.0 * std::numbers::pi);
-    curve.phase[i] -= 2.0 * std::numbers::pi * std::round(turns);
+    curve.phase[i] -= 2.0 * std::numbers::pi * (std::round)(turns);
   }
   return curve;
 }

@@ -115,11 +115,11 @@ inline void balance(DenseView<double> a, DenseView<double> b, DenseView<double> 
       double column = 0.0;
       for (int j = 0; j < states; ++j) {
         if (j == i) continue;
-        row += std::abs(a(i, j));
-        column += std::abs(a(j, i));
+        row += (std::abs)(a(i, j));
+        column += (std::abs)(a(j, i));
       }
       // Not finite if nothing couples to this state.
-      const double exponent = std::round(0.5 * std::log2(row / column));
+      const double exponent = (std::round)(0.5 * std::log2(row / column));
       if (!is_finite(exponent) || exponent == 0.0) continue;
       // x_i is replaced by x_i / 2^exponent.
       const double factor = std::exp2(exponent);

@@ -300,7 +300,7 @@ inline std::complex<double> loop_gain_of_channel(const ComplexMatrix& plant,
 /// Largest singular value.
 inline double largest_singular_value(const ComplexMatrix& matrix) {
   const int n = matrix.cols();
-  if (n == 1 && matrix.rows() == 1) return std::abs(matrix(0, 0));
+  if (n == 1 && matrix.rows() == 1) return (std::abs)(matrix(0, 0));
   ComplexMatrix square(n, n);
   for (int i = 0; i < n; ++i) {
     for (int j = 0; j < n; ++j) {
@@ -312,7 +312,7 @@ inline double largest_singular_value(const ComplexMatrix& matrix) {
   std::vector<std::complex<double>> values(static_cast<std::size_t>(n));
   if (!eigenvalues(square.view(), values.data())) return std::numeric_limits<double>::quiet_NaN();
   double largest = 0.0;
-  for (const auto& value : values) largest = std::max(largest, value.real());
+  for (const auto& value : values) largest = (std::max)(largest, value.real());
   return std::sqrt(largest);
 }
 
@@ -326,7 +326,7 @@ inline double largest_singular_value(const ComplexMatrix& matrix) {
 /// without derivatives; d is held from k to k + 1.
 class Loop {
  public:
-  using Complex = std::complex<double>;  ///< a response at a frequency
+  using ComplexNumber = std::complex<double>;  ///< a response at a frequency
 
   /// Closes the loop. Use `closed_loop` instead.
   /// @return error if plant and controller have different numbers of channels, if a number
@@ -337,12 +337,12 @@ class Loop {
     const int q = controller.channels();
     Rules<double> rules;
     rules.not_negative("controller.sample_time", T)
-        .require(plant.b.cols() == q, {"plant.inputs", static_cast<double>(plant.b.cols()),
-                                       "must be the channels of the controller, that is", -1,
-                                       static_cast<double>(q), true})
-        .require(plant.c.rows() == q, {"plant.outputs", static_cast<double>(plant.c.rows()),
-                                       "must be the channels of the controller, that is", -1,
-                                       static_cast<double>(q), true});
+        .demand(plant.b.cols() == q, {"plant.inputs", static_cast<double>(plant.b.cols()),
+                                      "must be the channels of the controller, that is", -1,
+                                      static_cast<double>(q), true})
+        .demand(plant.c.rows() == q, {"plant.outputs", static_cast<double>(plant.c.rows()),
+                                      "must be the channels of the controller, that is", -1,
+                                      static_cast<double>(q), true});
     for (const auto* matrix : {&plant.a, &plant.b, &plant.c, &plant.e}) {
       rules.finite("plant", detail::sum_of_magnitudes(*matrix));
     }
@@ -354,10 +354,10 @@ class Loop {
     }
     for (const double dead_time : plant.dead_time) {
       rules.not_negative("plant.dead_time", dead_time)
-          .require(T > 0.0 || !(dead_time > 0.0), "plant.dead_time", dead_time,
-                   "must be zero with a continuous controller")
-          .require(!(T > 0.0) || dead_time <= detail::most_whole_samples * T, "plant.dead_time",
-                   dead_time, "must not be above 1000 samples");
+          .demand(T > 0.0 || !(dead_time > 0.0), "plant.dead_time", dead_time,
+                  "must be zero with a continuous controller")
+          .demand(!(T > 0.0) || dead_time <= detail::most_whole_samples * T, "plant.dead_time",
+                  dead_time, "must not be above 1000 samples");
     }
     if (!rules) return rules.error();
     Loop loop;
@@ -396,49 +396,49 @@ class Loop {
   /// esokit::stability_abscissa of the closed loop: negative is stable.
   [[nodiscard]] double stability_abscissa() const noexcept { return abscissa_; }
   /// Poles of the closed loop, 1/s; sampled: z - 1.
-  [[nodiscard]] const std::vector<Complex>& poles() const noexcept { return poles_; }
+  [[nodiscard]] const std::vector<ComplexNumber>& poles() const noexcept { return poles_; }
 
   /// L at one actuator, with the other channels closed. @param frequency rad/s, above 0; sampled:
   /// up to pi / T @return error for a frequency outside this range or at a pole, or if there is no
   /// such channel
-  [[nodiscard]] Expected<Complex, Error<double>> loop_gain(double frequency,
-                                                           int channel = 0) const {
-    return at(frequency, channel, channel, [&](Complex value) {
+  [[nodiscard]] Expected<ComplexNumber, Error<double>> loop_gain(double frequency,
+                                                                 int channel = 0) const {
+    return at(frequency, channel, channel, [&](ComplexNumber value) {
       return detail::loop_gain_of_channel(detail::response(plant_, value),
                                           detail::response(controller_, value), channel);
     });
   }
   /// S = 1 / (1 + L): from a disturbance at an actuator to the input of the plant; with one channel
   /// also from a disturbance at the output to y. Errors as for loop_gain.
-  [[nodiscard]] Expected<Complex, Error<double>> sensitivity(double frequency,
-                                                             int channel = 0) const {
-    return of_gain(frequency, channel, [](Complex l) { return 1.0 / (1.0 + l); });
+  [[nodiscard]] Expected<ComplexNumber, Error<double>> sensitivity(double frequency,
+                                                                   int channel = 0) const {
+    return of_gain(frequency, channel, [](ComplexNumber l) { return 1.0 / (1.0 + l); });
   }
   /// T = L / (1 + L): with one channel from noise v to -y. Errors as for loop_gain.
-  [[nodiscard]] Expected<Complex, Error<double>> complementary_sensitivity(double frequency,
-                                                                           int channel = 0) const {
-    return of_gain(frequency, channel, [](Complex l) { return l / (1.0 + l); });
+  [[nodiscard]] Expected<ComplexNumber, Error<double>> complementary_sensitivity(
+      double frequency, int channel = 0) const {
+    return of_gain(frequency, channel, [](ComplexNumber l) { return l / (1.0 + l); });
   }
   /// From noise on one measurement to one u. Errors as for loop_gain.
-  [[nodiscard]] Expected<Complex, Error<double>> noise_to_control(double frequency, int control = 0,
-                                                                  int measurement = 0) const {
-    return at(frequency, control, measurement, [&](Complex value) {
+  [[nodiscard]] Expected<ComplexNumber, Error<double>> noise_to_control(double frequency,
+                                                                        int control = 0,
+                                                                        int measurement = 0) const {
+    return at(frequency, control, measurement, [&](ComplexNumber value) {
       // u = C (v + P u)
       auto c = detail::response(controller_, value);
       auto inner = detail::identity_plus(detail::product(c, detail::response(plant_, value)), -1.0);
       detail::solve_in_place(inner.view(), c.view());
-      return Complex(c(control, measurement));
+      return ComplexNumber(c(control, measurement));
     });
   }
   /// From a disturbance of the plant to one y. Errors as for loop_gain.
-  [[nodiscard]] Expected<Complex, Error<double>> disturbance_to_output(double frequency,
-                                                                       int output = 0,
-                                                                       int disturbance = 0) const {
-    return at(frequency, output, disturbance, [&](Complex value) {
+  [[nodiscard]] Expected<ComplexNumber, Error<double>> disturbance_to_output(
+      double frequency, int output = 0, int disturbance = 0) const {
+    return at(frequency, output, disturbance, [&](ComplexNumber value) {
       auto y = detail::response(plant_, value, true);
       auto inner = output_return(value);
       detail::solve_in_place(inner.view(), y.view());
-      return Complex(y(output, disturbance));
+      return ComplexNumber(y(output, disturbance));
     });
   }
   /// Largest singular value of the sensitivity (I - P C)^-1: the largest amplification of a
@@ -446,9 +446,9 @@ class Loop {
   /// to similar size. Errors as for loop_gain.
   [[nodiscard]] Expected<double, Error<double>> largest_sensitivity(double frequency) const {
     double largest = 0.0;
-    const auto found = at(frequency, 0, 0, [&](Complex value) {
+    const auto found = at(frequency, 0, 0, [&](ComplexNumber value) {
       largest = sensitivity_at(value);
-      return Complex(largest);
+      return ComplexNumber(largest);
     });
     if (!found) return found.error();
     return largest;
@@ -458,7 +458,7 @@ class Loop {
   [[nodiscard]] const detail::DensePlant& continuous_plant() const noexcept { return continuous_; }
   [[nodiscard]] const detail::SampledPlant& plant() const noexcept { return plant_; }
   [[nodiscard]] const LinearController& controller() const noexcept { return controller_; }
-  [[nodiscard]] double sensitivity_at(Complex value) const {
+  [[nodiscard]] double sensitivity_at(ComplexNumber value) const {
     auto inner = output_return(value);
     auto identity = detail::ComplexMatrix(channels(), channels());
     for (int i = 0; i < channels(); ++i) identity(i, i) = 1.0;
@@ -466,7 +466,7 @@ class Loop {
     return detail::largest_singular_value(identity);
   }
   [[nodiscard]] Check<double> check_channel(const char* field, int channel) const {
-    return Rules<double>{}.require(
+    return Rules<double>{}.demand(
         0 <= channel && channel < channels(),
         {field, static_cast<double>(channel), "must be 0 .. channels - 1, that is at most", -1,
          static_cast<double>(channels() - 1), true});
@@ -477,22 +477,22 @@ class Loop {
   Loop() = default;
 
   /// I - P C
-  [[nodiscard]] detail::ComplexMatrix output_return(Complex value) const {
+  [[nodiscard]] detail::ComplexMatrix output_return(ComplexNumber value) const {
     return detail::identity_plus(
         detail::product(detail::response(plant_, value), detail::response(controller_, value)),
         -1.0);
   }
 
   template <class Function>
-  Expected<Complex, Error<double>> at(double frequency, int row, int column,
-                                      Function&& function) const {
+  Expected<ComplexNumber, Error<double>> at(double frequency, int row, int column,
+                                            Function&& function) const {
     Rules<double> rules;
     rules.positive("frequency", frequency)
         .all_of(detail::check_frequency(frequency, sample_time()))
         .all_of(check_channel("channel", row))
         .all_of(check_channel("channel", column));
     if (!rules) return rules.error();
-    const Complex value = function(detail::frequency_operator(frequency, sample_time()));
+    const ComplexNumber value = function(detail::frequency_operator(frequency, sample_time()));
     if (!is_finite(value.real()) || !is_finite(value.imag())) {
       return Error<double>{"frequency", frequency, "is a pole of the closed loop"};
     }
@@ -500,11 +500,11 @@ class Loop {
   }
 
   template <class Function>
-  Expected<Complex, Error<double>> of_gain(double frequency, int channel,
-                                           Function&& function) const {
+  Expected<ComplexNumber, Error<double>> of_gain(double frequency, int channel,
+                                                 Function&& function) const {
     const auto l = loop_gain(frequency, channel);
     if (!l) return l.error();
-    const Complex value = function(*l);
+    const ComplexNumber value = function(*l);
     if (!is_finite(value.real()) || !is_finite(value.imag())) {
       return Error<double>{"frequency", frequency, "is a pole of the closed loop"};
     }
@@ -515,7 +515,7 @@ class Loop {
   detail::SampledPlant plant_;
   LinearController controller_;  ///< with its own u as the applied u
   DynamicSystem system_;
-  std::vector<Complex> poles_;
+  std::vector<ComplexNumber> poles_;
   double abscissa_ = 0.0;
   double input_gain_ = 0.0;
 };
@@ -535,7 +535,7 @@ LoopResult closed_loop(const LinearPlant<States, S, Inputs, Outputs>& plant,
                 "use FrozenObserver and ObserverWithLaw; for your own type write a function "
                 "linear_controller beside it");
   if constexpr (AnalysedController<Controller>) {
-    if (const auto ok = plant.check(); !ok) {
+    if (const auto ok = plant.validate(); !ok) {
       const auto& error = ok.error();
       return Error<double>{error.field, static_cast<double>(error.value), error.rule, error.index};
     }

@@ -37,8 +37,8 @@ inline Expected<LoopDeviations, Error<double>> noise(const Loop& loop, const Loo
   const auto take = [&](const char* field, const std::vector<double>& deviations, int first,
                         int most) {
     const int count = static_cast<int>(deviations.size());
-    rules.require(count <= most, {field, static_cast<double>(count), "must have at most", -1,
-                                  static_cast<double>(most), true});
+    rules.demand(count <= most, {field, static_cast<double>(count), "must have at most", -1,
+                                 static_cast<double>(most), true});
     for (int i = 0; i < count && i < most; ++i) {
       const double deviation = deviations[static_cast<std::size_t>(i)];
       rules.not_negative(field, deviation, i);
@@ -47,15 +47,15 @@ inline Expected<LoopDeviations, Error<double>> noise(const Loop& loop, const Loo
   };
   take("measurement", of.measurement, q, q);
   take("disturbance", of.disturbance, 2 * q, inputs - 2 * q);
-  rules.require(loop.stable(), "stability_abscissa", loop.stability_abscissa(),
-                "must be negative: a loop that is not stable has no steady state");
+  rules.demand(loop.stable(), "stability_abscissa", loop.stability_abscissa(),
+               "must be negative: a loop that is not stable has no steady state");
   if (!rules) return rules.error();
   const auto covariance = output_covariance(system, input);
   if (!covariance) return covariance.error();
   LoopDeviations deviations;
   for (int i = 0; i < outputs; ++i) {
     auto& list = i < q ? deviations.output : i < 2 * q ? deviations.control : deviations.estimates;
-    list.push_back(std::sqrt(std::max((*covariance)(i, i), 0.0)));
+    list.push_back(std::sqrt((std::max)((*covariance)(i, i), 0.0)));
   }
   return deviations;
 }

@@ -32,8 +32,8 @@ inline Expected<LoopResponse, Error<double>> respond(const Loop& loop, const Loo
   const bool sampled = loop.sample_time() > 0.0;
   Rules<double> rules;
   rules
-      .require(0 <= step.channel && step.channel < inputs, "channel", step.channel,
-               "must be one that the loop has")
+      .demand(0 <= step.channel && step.channel < inputs, "channel", step.channel,
+              "must be one that the loop has")
       .positive("duration", step.duration)
       .finite("height", step.height);
   if (sampled) {
@@ -43,7 +43,7 @@ inline Expected<LoopResponse, Error<double>> respond(const Loop& loop, const Loo
   }
   if (!rules) return rules.error();
   const double T = sampled ? loop.sample_time() : step.sample_time;
-  rules.require(step.duration / T < 1e7, "duration", step.duration, "must be below 1e7 samples");
+  rules.demand(step.duration / T < 1e7, "duration", step.duration, "must be below 1e7 samples");
   if (!rules) return rules.error();
   const int n = system.a.rows();
   DynamicMatrix<double> b(n, 1);
@@ -79,8 +79,8 @@ inline Expected<LoopResponse, Error<double>> respond(const Loop& loop, const Loo
       rate[static_cast<std::size_t>(i)] = sum;
     }
     for (std::size_t i = 0; i < x.size(); ++i) x[i] += rate[i];
-    rules.require(finite && is_finite(sum_of_magnitudes(x.data(), n)), "duration", step.duration,
-                  "gives a response that the scalar cannot hold: the loop is not stable");
+    rules.demand(finite && is_finite(sum_of_magnitudes(x.data(), n)), "duration", step.duration,
+                 "gives a response that the scalar cannot hold: the loop is not stable");
     if (!rules) return rules.error();
   }
   return response;

@@ -44,16 +44,16 @@ struct ScanRange {
 inline ScanRange scan_range(const Loop& loop, int channel) {
   ScanRange range;
   const double T = loop.sample_time();
-  double slowest = std::numeric_limits<double>::max();
+  double slowest = (std::numeric_limits<double>::max)();
   double fastest = 0.0;
   const auto look = [&](const std::vector<std::complex<double>>& poles, bool stable) {
     for (const std::complex<double>& p : poles) {
-      const double size = T > 0.0 ? std::abs(p) / T : std::abs(p);
+      const double size = T > 0.0 ? (std::abs)(p) / T : (std::abs)(p);
       // Integrators are computed as poles of the size of rounding errors.
       if (!stable && !(size > 1e-9 * fastest)) continue;
-      if (stable) fastest = std::max(fastest, size);
-      slowest = std::min(slowest, size);
-      range.features.push_back(T > 0.0 ? std::abs(std::arg(1.0 + p)) / T : std::abs(p.imag()));
+      if (stable) fastest = (std::max)(fastest, size);
+      slowest = (std::min)(slowest, size);
+      range.features.push_back(T > 0.0 ? (std::abs)(std::arg(1.0 + p)) / T : (std::abs)(p.imag()));
     }
   };
   look(loop.poles(), true);
@@ -64,7 +64,8 @@ inline ScanRange scan_range(const Loop& loop, int channel) {
   }
   range.from = 1e-3 * slowest;
   range.to = T > 0.0 ? std::numbers::pi / T : 1e3 * fastest;
-  range.from = std::max(std::min(range.from, 1e-3 * range.to), std::numeric_limits<double>::min());
+  range.from =
+      (std::max)((std::min)(range.from, 1e-3 * range.to), (std::numeric_limits<double>::min)());
   std::sort(range.features.begin(), range.features.end());
   return range;
 }
@@ -74,7 +75,7 @@ inline ScanRange scan_range(const Loop& loop, int channel) {
 /// frequency, at which everything slow has ended.
 inline double loop_gain_at_zero(const LoopGain& response, const ScanRange& range) {
   const std::complex<double> l = response.at(0.0);
-  return std::abs(l) <= 2.0 * std::abs(response(range.from))
+  return (std::abs)(l) <= 2.0 * (std::abs)(response(range.from))
              ? l.real()
              : std::numeric_limits<double>::quiet_NaN();
 }
@@ -84,11 +85,11 @@ inline double loop_gain_at_zero(const LoopGain& response, const ScanRange& range
 template <class Response, class Visit>
 void scan_piece(const Response& response, double w1, std::complex<double> l1, double w2,
                 std::complex<double> l2, int depth, Visit& visit) {
-  const double step = std::abs(l2 - l1);
-  const double size = std::min(std::abs(l1), std::abs(l2));
-  const double distance = std::min(std::abs(1.0 + l1), std::abs(1.0 + l2));
-  const bool fine =
-      step <= std::min(0.2 * size, 0.5 * distance) || std::max(std::abs(l1), std::abs(l2)) < 1e-9;
+  const double step = (std::abs)(l2 - l1);
+  const double size = (std::min)((std::abs)(l1), (std::abs)(l2));
+  const double distance = (std::min)((std::abs)(1.0 + l1), (std::abs)(1.0 + l2));
+  const bool fine = step <= (std::min)(0.2 * size, 0.5 * distance) ||
+                    (std::max)((std::abs)(l1), (std::abs)(l2)) < 1e-9;
   if (fine || depth == 0) {
     visit(w1, l1, w2, l2);
     return;

@@ -109,8 +109,8 @@ inline Check<double> solve_lyapunov(const double* a, const double* q, double* p,
     }
   }
   const double share = lyapunov_residual(a, q, p, residual, work, n, sampled);
-  return Rules<double>{}.require(share <= 1e-11, "system", share,
-                                 "leaves too large a residual in the Lyapunov equation");
+  return Rules<double>{}.demand(share <= 1e-11, "system", share,
+                                "leaves too large a residual in the Lyapunov equation");
 }
 
 }  // namespace detail

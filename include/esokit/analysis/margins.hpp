@@ -73,24 +73,24 @@ class MarginFinder {
   void at_zero(double l) {
     if (!is_finite(l)) return;
     real_axis(l, 0.0);
-    modulus_(distance(), 0.0, std::abs(1.0 + l));
+    modulus_(distance(), 0.0, (std::abs)(1.0 + l));
   }
 
   void operator()(double w1, std::complex<double> l1, double w2, std::complex<double> l2) {
     if (std::signbit(l1.imag()) != std::signbit(l2.imag()) &&
-        std::min(l1.real(), l2.real()) < 0.0) {
+        (std::min)(l1.real(), l2.real()) < 0.0) {
       const double w = bisect([&](double x) { return response_(x).imag(); }, w1, w2);
       const std::complex<double> l = response_(w);
       // At a pole on the axis the imaginary part changes its sign at infinity.
-      if (std::abs(l) < 10.0 * std::max(std::abs(l1), std::abs(l2))) real_axis(l.real(), w);
+      if ((std::abs)(l) < 10.0 * (std::max)((std::abs)(l1), (std::abs)(l2))) real_axis(l.real(), w);
     }
-    if ((std::abs(l1) < 1.0) != (std::abs(l2) < 1.0)) {
-      const double w = bisect([&](double x) { return std::abs(response_(x)) - 1.0; }, w1, w2);
-      const double shift = std::abs(std::arg(-response_(w)));
+    if (((std::abs)(l1) < 1.0) != ((std::abs)(l2) < 1.0)) {
+      const double w = bisect([&](double x) { return (std::abs)(response_(x)) - 1.0; }, w1, w2);
+      const double shift = (std::abs)(std::arg(-response_(w)));
       if (!phase_ || shift < phase_->value) phase_ = Margin{shift, w};
     }
-    if (!modulus_.found()) modulus_(distance(), w1, std::abs(1.0 + l1));
-    modulus_(distance(), w2, std::abs(1.0 + l2));
+    if (!modulus_.found()) modulus_(distance(), w1, (std::abs)(1.0 + l1));
+    modulus_(distance(), w2, (std::abs)(1.0 + l2));
   }
 
   /// Evaluates a point at which L crosses or touches the real axis.
@@ -110,7 +110,7 @@ class MarginFinder {
 
  private:
   [[nodiscard]] auto distance() const {
-    return [this](double w) { return std::abs(1.0 + response_(w)); };
+    return [this](double w) { return (std::abs)(1.0 + response_(w)); };
   }
 
   const Response& response_;
@@ -130,8 +130,8 @@ class MarginFinder {
 inline Expected<Margins, Error<double>> margins(const Loop& loop, int channel = 0) {
   Rules<double> rules;
   rules.all_of(loop.check_channel("channel", channel))
-      .require(loop.stable(), "stability_abscissa", loop.stability_abscissa(),
-               detail::unstable_loop_rule);
+      .demand(loop.stable(), "stability_abscissa", loop.stability_abscissa(),
+              detail::unstable_loop_rule);
   if (!rules) return rules.error();
   const auto response = detail::loop_gain_of(loop, channel);
   const detail::ScanRange range = detail::scan_range(loop, channel);
@@ -197,8 +197,8 @@ Expected<Interval<>, Error<double>> input_gain_range(const LinearPlant<States, S
 inline Expected<Margin, Error<double>> gain_variation(const Loop& loop, int channel = 0) {
   Rules<double> rules;
   rules.all_of(loop.check_channel("channel", channel))
-      .require(loop.stable(), "stability_abscissa", loop.stability_abscissa(),
-               detail::unstable_loop_rule);
+      .demand(loop.stable(), "stability_abscissa", loop.stability_abscissa(),
+              detail::unstable_loop_rule);
   if (!rules) return rules.error();
   const auto response = detail::loop_gain_of(loop, channel);
   // The bound on f + 1/f.
@@ -225,7 +225,7 @@ inline Expected<Margin, Error<double>> gain_variation(const Loop& loop, int chan
   if (!is_finite(sum.value)) return Margin{};
   const double half = 0.5 * sum.value;
   // f from f + 1/f, without a difference of nearly equal numbers; never below 1.
-  return Margin{half + std::sqrt(std::max((half - 1.0) * (half + 1.0), 0.0)), sum.frequency};
+  return Margin{half + std::sqrt((std::max)((half - 1.0) * (half + 1.0), 0.0)), sum.frequency};
 }
 
 /// The same for the loop of a plant and a controller, see `closed_loop`.

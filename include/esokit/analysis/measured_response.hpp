@@ -50,15 +50,15 @@ DynamicMatrix<double> load_column(const Observer& observer, int states) {
 /// From w to the mean of f over each sample. @param shift z
 template <class Path>
 std::complex<double> path_response(const Path& path, std::complex<double> shift) {
-  using Complex = std::complex<double>;
+  using ComplexNumber = std::complex<double>;
   const auto from_lag = path.course(1, 0, 0);
   const auto from_older = path.course(0, 1, 0);
   const auto from_newer = path.course(0, 0, 1);
   const auto number = [](const auto& s) { return static_cast<double>(s); };
-  const Complex back = 1.0 / shift;
-  const Complex lagged =
+  const ComplexNumber back = 1.0 / shift;
+  const ComplexNumber lagged =
       (number(from_older.end) * back + number(from_newer.end)) / (shift - number(from_lag.end));
-  const Complex mean =
+  const ComplexNumber mean =
       number(from_lag.mean) * lagged + number(from_older.mean) * back + number(from_newer.mean);
   return number(path.input().gain) * mean * std::pow(back, path.whole());
 }
@@ -88,9 +88,9 @@ Expected<std::complex<double>, Error<double>> measured_to_output(
   const double time = loop->sample_time();
   constexpr int inputs = std::remove_cvref_t<decltype(measured)>::inputs;
   if (auto ok = Rules<double>{}
-                    .require(0 <= input && input < inputs, "input", input,
-                             "must be the number of a measured disturbance")
-                    .all_of(Path::check(truth, time, -1));
+                    .demand(0 <= input && input < inputs, "input", input,
+                            "must be the number of a measured disturbance")
+                    .all_of(Path::validate(truth, time, -1));
       !ok) {
     return ok.error();
   }

@@ -211,7 +211,7 @@ inline void put_together(const ObserverSizes& sizes, const ObserverParts& parts,
       for (int r = 0; r < size; ++r) {
         for (int q = 0; q < size; ++q) {
           const double share = parts.disturbance(r, q);
-          if (!(std::abs(share) > 0.0)) continue;
+          if (!((std::abs)(share) > 0.0)) continue;
           for (int j = 0; j < states; ++j) {
             added(first + r, j) += share * added(first - size + q, j);
           }

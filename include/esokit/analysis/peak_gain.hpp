@@ -31,7 +31,7 @@ inline Check<double> peak_gain(const SystemView& system, double abscissa, double
     exp_minus_identity(advance, work + n * n, n);
   }
   for (int input = 0; input < system.inputs(); ++input) {
-    for (int r = 0; r < system.outputs(); ++r) peak(r, input) = std::abs(system.d(r, input));
+    for (int r = 0; r < system.outputs(); ++r) peak(r, input) = (std::abs)(system.d(r, input));
     for (int i = 0; i < n; ++i) x[i] = system.b(i, input);
     for (long k = 0;; ++k) {
       // The trapezoid rule takes half of the first value, the sum of a sampled system all of it.
@@ -42,9 +42,9 @@ inline Check<double> peak_gain(const SystemView& system, double abscissa, double
         double size = 0.0;
         for (int i = 0; i < n; ++i) {
           response += system.c(r, i) * x[i];
-          size += std::abs(system.c(r, i) * x[i]);
+          size += (std::abs)(system.c(r, i) * x[i]);
         }
-        peak(r, input) += weight * std::abs(response);
+        peak(r, input) += weight * (std::abs)(response);
         // Relative to the remainder of a geometric series.
         const double slowest = system.sampled() ? -abscissa : -abscissa * step;
         if (size * step > 1e-9 * slowest * peak(r, input)) ended = false;
@@ -84,7 +84,7 @@ template <int States, int Inputs, int Outputs>
 Expected<EigenMatrix<double, Outputs, Inputs>, Error<double>> peak_gain(
     const LinearSystem<States, Inputs, Outputs>& system) {
   double fastest = 0.0;
-  for (const std::complex<double>& p : poles(system)) fastest = std::max(fastest, std::abs(p));
+  for (const std::complex<double>& p : poles(system)) fastest = (std::max)(fastest, (std::abs)(p));
   EigenMatrix<double, Outputs, Inputs> peak;
   Array<double, 3 * States * States + 2 * States> work;
   if (const auto ok = detail::peak_gain(detail::view_of(system), stability_abscissa(system),
@@ -98,7 +98,7 @@ Expected<EigenMatrix<double, Outputs, Inputs>, Error<double>> peak_gain(
 /// The same for a system whose sizes are known at run time.
 inline Expected<DynamicMatrix<double>, Error<double>> peak_gain(const DynamicSystem& system) {
   double fastest = 0.0;
-  for (const std::complex<double>& p : poles(system)) fastest = std::max(fastest, std::abs(p));
+  for (const std::complex<double>& p : poles(system)) fastest = (std::max)(fastest, (std::abs)(p));
   DynamicMatrix<double> peak(system.c.rows(), system.b.cols());
   DynamicMatrix<double> work(system.a.rows(), 3 * system.a.rows() + 2);
   if (const auto ok = detail::peak_gain(detail::view_of(system), stability_abscissa(system),

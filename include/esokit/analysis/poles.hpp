@@ -22,9 +22,9 @@ inline double worst_pole(const std::complex<double>* poles, std::size_t count,
     const std::complex<double> p = poles[i];
     // |1 + p| - 1 = (2 Re p + |p|^2) / (|1 + p| + 1)
     const double excess =
-        sampled ? (2.0 * p.real() + std::norm(p)) / (std::abs(1.0 + p) + 1.0) : p.real();
+        sampled ? (2.0 * p.real() + std::norm(p)) / ((std::abs)(1.0 + p) + 1.0) : p.real();
     if (!is_finite(excess)) return std::numeric_limits<double>::infinity();
-    worst = std::max(worst, excess);
+    worst = (std::max)(worst, excess);
   }
   return worst;
 }
@@ -50,12 +50,12 @@ inline std::vector<std::complex<double>> poles_of(const DynamicMatrix<double>& a
 template <int States, int Inputs, int Outputs>
 EigenMatrix<std::complex<double>, States> poles(
     const LinearSystem<States, Inputs, Outputs>& system) {
-  using Complex = std::complex<double>;
-  EigenMatrix<Complex, States, States> work;
+  using ComplexNumber = std::complex<double>;
+  EigenMatrix<ComplexNumber, States, States> work;
   for (int j = 0; j < States; ++j) {
     for (int i = 0; i < States; ++i) work(i, j) = system.a(i, j);
   }
-  EigenMatrix<Complex, States> values;
+  EigenMatrix<ComplexNumber, States> values;
   if (!detail::eigenvalues({work.data(), States}, values.data())) {
     values.setConstant(std::numeric_limits<double>::quiet_NaN());
   }

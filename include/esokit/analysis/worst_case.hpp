@@ -48,7 +48,7 @@ inline Check<double> judge(const LoopResult& loop, Badness& worst) {
   if (!loop->stable()) return {};
   constexpr double none = -std::numeric_limits<double>::infinity();
   worst = {abscissa, none, none, 0.0, none, none};
-  const auto take = [&](std::size_t i, double value) { worst[i] = std::max(worst[i], value); };
+  const auto take = [&](std::size_t i, double value) { worst[i] = (std::max)(worst[i], value); };
   for (int channel = 0; channel < loop->channels(); ++channel) {
     const auto m = margins(*loop, channel);
     if (!m) return m.error();
@@ -143,16 +143,16 @@ Expected<WorstCase<Count>, Error<double>> worst_case(PlantOf&& plant_of,
                                                      const WorstCaseSearch& search = {}) {
   Rules<double> rules;
   rules
-      .require(2 <= search.points && search.points <= 1000, "points", search.points,
-               "must be 2 .. 1000")
-      .require(0 <= search.halvings && search.halvings <= 100, "halvings", search.halvings,
-               "must be 0 .. 100");
+      .demand(2 <= search.points && search.points <= 1000, "points", search.points,
+              "must be 2 .. 1000")
+      .demand(0 <= search.halvings && search.halvings <= 100, "halvings", search.halvings,
+              "must be 0 .. 100");
   for (std::size_t i = 0; i < Count; ++i) {
     const auto index = static_cast<int>(i);
     rules.finite("ranges", ranges[i].lower, index)
         .finite("ranges", ranges[i].upper, index)
-        .require(!(ranges[i].lower > ranges[i].upper), "ranges", ranges[i].lower,
-                 "must not be above upper", index);
+        .demand(!(ranges[i].lower > ranges[i].upper), "ranges", ranges[i].lower,
+                "must not be above upper", index);
   }
   if (!rules) return rules.error();
   const auto look = [&](const std::vector<double>& at, detail::Badness& worst) -> Check<double> {

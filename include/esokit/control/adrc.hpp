@@ -94,7 +94,7 @@ class Adrc {
       .observes = true};
 
   using Config = AdrcConfig<Observer>;  ///< settings of make
-  using Status = StatusOf<S>;           ///< StepStatus, for a pack one per lane
+  using StatusType = StatusOf<S>;       ///< StepStatus, for a pack one per lane
   template <class T>
   using with_scalar =
       Adrc<detail::WithScalar<Observer, T>, Form>;  ///< the same with another scalar
@@ -188,14 +188,14 @@ class Adrc {
   }
 
   /// Takes over a plant at rest at y under u, with the reference at y, too.
-  Status start(S y, S u) noexcept { return start(y, u, y); }
+  StatusType start(S y, S u) noexcept { return start(y, u, y); }
 
   /// Takes over a plant at rest at y under u. @param reference r, used by the error-based form only
   /// @return ok, or input_rejected or state_rejected if u or y is not finite: nothing changes then
-  Status start(S y, S u, S reference) noexcept {
+  StatusType start(S y, S u, S reference) noexcept {
     // Tested one by one: under -ffast-math a compiler may replace y - y by zero.
     if (!all(is_finite(y)) || !all(is_finite(reference))) return StepStatus::state_rejected;
-    const Status status = loop_.start(measured(y, reference), u);
+    const StatusType status = loop_.start(measured(y, reference), u);
     if (status == StepStatus::ok) soft_.reset();
     return status;
   }
@@ -252,7 +252,7 @@ class Adrc {
   /// The limits of u.
   [[nodiscard]] const Limiter<S>& limiter() const noexcept { return loop_.limiter(); }
   /// Status of the observer at the last sample.
-  [[nodiscard]] Status status() const noexcept { return loop_.status(); }
+  [[nodiscard]] StatusType status() const noexcept { return loop_.status(); }
   /// Whether u is determined by the law, the start hold or the rule for missing measurements.
   [[nodiscard]] Lanes<LoopMode, S> mode() const noexcept { return loop_.mode(); }
   /// k_0 .. k_(n-1).

@@ -79,8 +79,8 @@ class AdrcLaw {
                           "gives a gain that the scalar cannot hold");
     }
     for (const S& gain : law.gains_) {
-      rules.require(all(is_finite(S(gain * law.inverse_input_gain_))), "input_gain",
-                    config.input_gain, "with these gains gives a law that the scalar cannot hold");
+      rules.demand(all(is_finite(S(gain * law.inverse_input_gain_))), "input_gain",
+                   config.input_gain, "with these gains gives a law that the scalar cannot hold");
     }
     if (!rules) return rules.error();
     return law;

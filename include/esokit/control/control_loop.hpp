@@ -47,10 +47,10 @@ Check<S> check_within(const char* field, const S& input, const Limits<S>& limits
   const bool nothing_said = !(input < S(0)) && !(input > S(0));
   return Rules<S>{}
       .finite(field, input)
-      .require(nothing_said || !(input < limits.lower),
-               {field, input, "must not be below limits.lower", -1, limits.lower, true})
-      .require(nothing_said || !(input > limits.upper),
-               {field, input, "must not be above limits.upper", -1, limits.upper, true});
+      .demand(nothing_said || !(input < limits.lower),
+              {field, input, "must not be below limits.lower", -1, limits.lower, true})
+      .demand(nothing_said || !(input > limits.upper),
+              {field, input, "must not be above limits.upper", -1, limits.upper, true});
 }
 
 template <PlainScalar S>
@@ -71,25 +71,23 @@ Expected<CheckedLoop<S>, Error<S>> check_loop(const LoopSettings<S>& settings, S
   Rules<S> rules;
   rules.not_negative("start_hold.time", settings.start_hold.time)
       .all_of(check_within("start_hold.input", settings.start_hold.input, settings.limits))
-      .require(samples < S(1 << 24), "start_hold.time", settings.start_hold.time,
-               "must be below 2^24 samples");
+      .demand(samples < S(1 << 24), "start_hold.time", settings.start_hold.time,
+              "must be below 2^24 samples");
   if (settings.missing.input) {
     rules.all_of(check_within("missing.input", *settings.missing.input, settings.limits));
   }
-  rules
-      .require(1 <= divider && divider <= 1000, "measurement_divider", counted, "must be 1 .. 1000")
-      .require(
-          divider == 1 || divider <= max_gap,
-          {"measurement_divider", counted, "must not be above the observer's max_gap, which is", -1,
-           static_cast<S>(max_gap), true})
-      .require(divider == 1 || bears_gaps, "measurement_divider", counted,
-               "must be 1: regular gaps restart this observer");
+  rules.demand(1 <= divider && divider <= 1000, "measurement_divider", counted, "must be 1 .. 1000")
+      .demand(divider == 1 || divider <= max_gap,
+              {"measurement_divider", counted, "must not be above the observer's max_gap, which is",
+               -1, static_cast<S>(max_gap), true})
+      .demand(divider == 1 || bears_gaps, "measurement_divider", counted,
+              "must be 1: regular gaps restart this observer");
   if (!rules) return rules.error();
   // The observer counts missing samples up to 65533.
   const int most = 65534 / divider - 1;
-  rules.require(0 <= settings.missing.most && settings.missing.most <= most,
-                {"missing.most", static_cast<S>(settings.missing.most),
-                 "must be 0 up to 65534 samples, that is", -1, static_cast<S>(most), true});
+  rules.demand(0 <= settings.missing.most && settings.missing.most <= most,
+               {"missing.most", static_cast<S>(settings.missing.most),
+                "must be 0 up to 65534 samples, that is", -1, static_cast<S>(most), true});
   if (!rules) return rules.error();
   return CheckedLoop<S>{*limiter, static_cast<std::uint32_t>(samples)};
 }
@@ -149,7 +147,7 @@ class ControlLoop {
  public:
   using S = typename Observer::scalar_type;  ///< type of signals and settings
   using scalar_type = S;                     ///< the same type
-  using Status = StatusOf<S>;                ///< StepStatus, for a pack one per lane
+  using StatusType = StatusOf<S>;            ///< StepStatus, for a pack one per lane
 
   /// Checks the settings.
   /// @param observer as returned by its `make`
@@ -164,9 +162,9 @@ class ControlLoop {
     if constexpr (has_step_time) {
       const int divider = settings.measurement_divider;
       Rules<S> rules;
-      rules.require(divider == 1 || observer.bridges(divider), "measurement_divider",
-                    static_cast<S>(divider),
-                    "must be so small that VariableTime bridges as many of its longest steps");
+      rules.demand(divider == 1 || observer.bridges(divider), "measurement_divider",
+                   static_cast<S>(divider),
+                   "must be so small that VariableTime bridges as many of its longest steps");
       if (!rules) return rules.error();
     }
     return ControlLoop(observer, checked->limiter, settings, checked->hold_samples, watched);
@@ -260,10 +258,10 @@ class ControlLoop {
 
   /// Starts in the steady state at y under u, dhat = -b0 u. Ends the start hold and safe mode.
   /// @return ok, or input_rejected or state_rejected if u or y is not finite: nothing changes then
-  Status start(S measured, S u) noexcept {
+  StatusType start(S measured, S u) noexcept {
     if (!all(is_finite(u))) return StepStatus::input_rejected;
     if (!all(is_finite(measured))) return StepStatus::state_rejected;
-    const Status status = detail::start_at_rest(observer_, measured, u);
+    const StatusType status = detail::start_at_rest(observer_, measured, u);
     if (status == StepStatus::ok) {
       limiter_.track(u);
       requested_ = u;
@@ -308,7 +306,7 @@ class ControlLoop {
   /// The u requested by the law, before the limits.
   [[nodiscard]] const S& requested() const noexcept { return requested_; }
   /// Status of the observer at the last step.
-  [[nodiscard]] Status status() const noexcept { return status_; }
+  [[nodiscard]] StatusType status() const noexcept { return status_; }
   /// What determines the output at present.
   [[nodiscard]] Lanes<LoopMode, S> mode() const noexcept { return mode_; }
   /// D: a measurement is due at every D-th step.
@@ -460,7 +458,7 @@ class ControlLoop {
   Observer observer_;
   Limiter<S> limiter_;
   S requested_{};
-  Status status_ = StepStatus::ok;
+  StatusType status_ = StepStatus::ok;
   /// True if anything besides the law has to be done: one test in the hot path.
   Lanes<bool, S> special_{false};
   Lanes<std::uint16_t, S> phase_{};

@@ -42,8 +42,8 @@ class CycleAnalysis {
     sums_[0].add(weight, c2, s2, difference, input);
     level_ += weight * input;
     sums_[1].add(weight, c2 * c4 - s2 * s4, s2 * c4 + c2 * s4, difference, input);
-    const Complex next{turn_.re * step_.re - turn_.im * step_.im,
-                       turn_.re * step_.im + turn_.im * step_.re};
+    const ComplexNumber next{turn_.re * step_.re - turn_.im * step_.im,
+                             turn_.re * step_.im + turn_.im * step_.re};
     // Corrects the rounding error of its length.
     const S length = S(1.5) - (next.re * next.re + next.im * next.im) / S(2);
     turn_ = {next.re * length, next.im * length};
@@ -80,8 +80,8 @@ class CycleAnalysis {
                S(24),
                true};
     const S sign = amplitude_ < S(0) ? S(-1) : S(1);
-    const Complex one{sign * first_.mean.re, sign * first_.mean.im};
-    const Complex three{sign * third_.mean.re, sign * third_.mean.im};
+    const ComplexNumber one{sign * first_.mean.re, sign * first_.mean.im};
+    const ComplexNumber three{sign * third_.mean.re, sign * third_.mean.im};
     const S size = magnitude(one);
     const E unusable{"input_gain", size, "is not usable"};
     if (!is_finite(size) || !is_finite(third_.square) || !(size > S(0))) return unusable;
@@ -172,18 +172,18 @@ class CycleAnalysis {
   }
 
  private:
-  struct Complex {
+  struct ComplexNumber {
     S re{}, im{};
   };
 
   /// Running mean and scatter.
   struct Spread {
-    Complex mean{};
+    ComplexNumber mean{};
     S square{};
     int count = 0;
-    void add(Complex value) noexcept {
+    void add(ComplexNumber value) noexcept {
       ++count;
-      const Complex before{value.re - mean.re, value.im - mean.im};
+      const ComplexNumber before{value.re - mean.re, value.im - mean.im};
       mean.re += before.re / S(count);
       mean.im += before.im / S(count);
       square += before.re * (value.re - mean.re) + before.im * (value.im - mean.im);
@@ -207,7 +207,7 @@ class CycleAnalysis {
     [[nodiscard]] S gain() const noexcept { return gain(ratio); }
   };
 
-  static Split split(const Complex& one, const Complex& three) noexcept {
+  static Split split(const ComplexNumber& one, const ComplexNumber& three) noexcept {
     Split at;
     at.size = magnitude(one);
     at.angle = std::atan2(-one.im, one.re);
@@ -222,7 +222,7 @@ class CycleAnalysis {
     return at;
   }
 
-  static Complex plus(const Complex& a, const Complex& b, S factor) noexcept {
+  static ComplexNumber plus(const ComplexNumber& a, const ComplexNumber& b, S factor) noexcept {
     return {a.re + factor * b.re, a.im + factor * b.im};
   }
 
@@ -234,13 +234,13 @@ class CycleAnalysis {
   };
 
   /// @param scatter of the angle of H_3 @param second w tau of a second lag that is known
-  [[nodiscard]] Fit fit(const Complex& one, const Complex& three, S scatter,
+  [[nodiscard]] Fit fit(const ComplexNumber& one, const ComplexNumber& three, S scatter,
                         S second) const noexcept {
-    const Complex lost = Order == 1 ? Complex{one.im, -one.re} : rubbed_.mean;
-    const Complex lost_third =
-        Order == 1 ? Complex{three.im / S(3), -three.re / S(3)} : rubbed_third_.mean;
+    const ComplexNumber lost = Order == 1 ? ComplexNumber{one.im, -one.re} : rubbed_.mean;
+    const ComplexNumber lost_third =
+        Order == 1 ? ComplexNumber{three.im / S(3), -three.re / S(3)} : rubbed_third_.mean;
     const auto without = [&](S share) {
-      const Complex a = plus(one, lost, share), b = plus(three, lost_third, share);
+      const ComplexNumber a = plus(one, lost, share), b = plus(three, lost_third, share);
       return split({a.re - second * a.im, a.im + second * a.re},
                    {b.re - S(3) * second * b.im, b.im + S(3) * second * b.re});
     };
@@ -266,9 +266,9 @@ class CycleAnalysis {
 
   /// Sums over two cycles.
   struct Sums {
-    Complex y{}, u{};
+    ComplexNumber y{}, u{};
     /// The sum of z divided by the sum of u.
-    [[nodiscard]] Complex over_input(const Complex& z) const noexcept {
+    [[nodiscard]] ComplexNumber over_input(const ComplexNumber& z) const noexcept {
       const S square = u.re * u.re + u.im * u.im;
       return {(z.re * u.re + z.im * u.im) / square, (z.im * u.re - z.re * u.im) / square};
     }
@@ -278,13 +278,13 @@ class CycleAnalysis {
       u.re += weight * c * input;
       u.im -= weight * s * input;
     }
-    [[nodiscard]] Complex ratio(S power) const noexcept {
-      const Complex h = over_input(y);
+    [[nodiscard]] ComplexNumber ratio(S power) const noexcept {
+      const ComplexNumber h = over_input(y);
       return {h.re / power, h.im / power};
     }
   };
 
-  static S magnitude(const Complex& z) noexcept { return std::hypot(z.re, z.im); }
+  static S magnitude(const ComplexNumber& z) noexcept { return std::hypot(z.re, z.im); }
 
   /// Student's factor for the 95 % interval of a mean of `windows_` numbers.
   [[nodiscard]] S student() const noexcept {
@@ -309,8 +309,8 @@ class CycleAnalysis {
   /// approximated by its first and third harmonic, those of the acceleration divided by j and 3 j,
   /// which give its zeros.
   void add_friction() noexcept {
-    const Complex one{sums_[0].y.im, -sums_[0].y.re};
-    const Complex three{sums_[1].y.im / S(3), -sums_[1].y.re / S(3)};
+    const ComplexNumber one{sums_[0].y.im, -sums_[0].y.re};
+    const ComplexNumber three{sums_[1].y.im / S(3), -sums_[1].y.re / S(3)};
     S t = S(-1.5707963267948966L) - std::atan2(one.im, one.re);
     S c{}, s{}, c3{}, s3{};
     const auto turn = [&] {
@@ -331,7 +331,7 @@ class CycleAnalysis {
   }
 
   S T_, amplitude_;
-  Complex turn_{}, step_{};
+  ComplexNumber turn_{}, step_{};
   Sums sums_[2]{};
   Spread first_{}, third_{}, rubbed_{}, rubbed_third_{};
   S level_{}, uneven_{};

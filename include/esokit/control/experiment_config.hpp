@@ -135,10 +135,10 @@ void check_levels(Rules<S>& rules, const ExperimentConfig<S>& config) {
   const auto within = [&](const char* field, const S& value, const S& level, const char* above,
                           const char* below) {
     rules
-        .require(is_finite(level) && !(level > config.limits.upper),
-                 {field, value, above, -1, config.limits.upper, true})
-        .require(is_finite(level) && !(level < config.limits.lower),
-                 {field, value, below, -1, config.limits.lower, true});
+        .demand(is_finite(level) && !(level > config.limits.upper),
+                {field, value, above, -1, config.limits.upper, true})
+        .demand(is_finite(level) && !(level < config.limits.lower),
+                {field, value, below, -1, config.limits.lower, true});
   };
   if (config.safe_input) {
     within("safe_input", *config.safe_input, *config.safe_input, "is above limits.upper, which is",
@@ -159,21 +159,21 @@ void check_levels(Rules<S>& rules, const ExperimentConfig<S>& config) {
          "is below limits.lower, which is");
   const bool rises = (approach.input > config.input) == (config.amplitude > S(0));
   rules
-      .require(Order == 1 && config.excitation == Excitation::relay, "approach.input",
-               approach.input, "must be left out: an approach needs a relay of order 1")
-      .require(absolute(approach.input - config.input) > S(0), "approach.input", approach.input,
-               "must not be input")
+      .demand(Order == 1 && config.excitation == Excitation::relay, "approach.input",
+              approach.input, "must be left out: an approach needs a relay of order 1")
+      .demand(absolute(approach.input - config.input) > S(0), "approach.input", approach.input,
+              "must not be input")
       .positive("response_time", config.response_time)
       .finite("approach.output", approach.output)
-      .require(rises ? config.highest_output < Limits<S>{}.upper
-                     : config.lowest_output > Limits<S>{}.lower,
-               rises ? "highest_output" : "lowest_output",
-               rises ? config.highest_output : config.lowest_output,
-               "must be given with an approach")
-      .require(config.lowest_output < approach.output - config.hysteresis &&
-                   approach.output + config.hysteresis < config.highest_output,
-               "approach.output", approach.output,
-               "must be between lowest_output and highest_output by more than the hysteresis");
+      .demand(rises ? config.highest_output < Limits<S>{}.upper
+                    : config.lowest_output > Limits<S>{}.lower,
+              rises ? "highest_output" : "lowest_output",
+              rises ? config.highest_output : config.lowest_output,
+              "must be given with an approach")
+      .demand(config.lowest_output < approach.output - config.hysteresis &&
+                  approach.output + config.hysteresis < config.highest_output,
+              "approach.output", approach.output,
+              "must be between lowest_output and highest_output by more than the hysteresis");
 }
 
 /// Refuses bad settings. @return the limiter of u
@@ -192,17 +192,17 @@ Expected<Limiter<S>, Error<S>> checked_experiment(const ExperimentConfig<S>& con
       .not_negative("fastest", config.fastest)
       .finite("lowest_output", config.lowest_output)
       .finite("highest_output", config.highest_output)
-      .require(config.lowest_output < config.highest_output,
-               {"lowest_output", config.lowest_output, "must be below highest_output", -1,
-                config.highest_output, true})
+      .demand(config.lowest_output < config.highest_output,
+              {"lowest_output", config.lowest_output, "must be below highest_output", -1,
+               config.highest_output, true})
       .positive("time_limit", config.time_limit)
       .not_negative("hand_over", config.hand_over)
-      .require(6 <= cycles && cycles <= 200 && cycles % 2 == 0, "cycles", static_cast<S>(cycles),
-               "must be even, 6 .. 200");
+      .demand(6 <= cycles && cycles <= 200 && cycles % 2 == 0, "cycles", static_cast<S>(cycles),
+              "must be even, 6 .. 200");
   if (relay) {
     rules.positive("hysteresis", config.hysteresis)
-        .require(!(config.hysteresis >= config.travel),
-                 {"hysteresis", config.hysteresis, "must be below travel", -1, config.travel, true})
+        .demand(!(config.hysteresis >= config.travel),
+                {"hysteresis", config.hysteresis, "must be below travel", -1, config.travel, true})
         .left_out("half_period", config.half_period, "must be left out with a relay");
   } else {
     rules.left_out("hysteresis", config.hysteresis, "must be left out with steps")
@@ -225,33 +225,33 @@ Expected<Limiter<S>, Error<S>> checked_experiment(const ExperimentConfig<S>& con
   const S samples = config.time_limit / T;
   check_levels<Order>(rules, config);
   rules
-      .require(is_finite(samples) && samples < S(1 << 24), "time_limit", config.time_limit,
-               "must be below 2^24 samples")
-      .require(config.rest < config.time_limit,
-               {"rest", config.rest, "must be below time_limit", -1, config.time_limit, true})
-      .require(
+      .demand(is_finite(samples) && samples < S(1 << 24), "time_limit", config.time_limit,
+              "must be below 2^24 samples")
+      .demand(config.rest < config.time_limit,
+              {"rest", config.rest, "must be below time_limit", -1, config.time_limit, true})
+      .demand(
           config.hand_over < config.time_limit,
           {"hand_over", config.hand_over, "must be below time_limit", -1, config.time_limit, true});
   if (!rules) return rules.error();
   if (!relay) {
     rules
-        .require(config.half_period < config.time_limit,
-                 {"half_period", config.half_period, "must be below time_limit", -1,
-                  config.time_limit, true})
-        .require((std::round)(config.half_period / T) >= S(8), "half_period", config.half_period,
-                 "must be at least 8 samples");
+        .demand(config.half_period < config.time_limit,
+                {"half_period", config.half_period, "must be below time_limit", -1,
+                 config.time_limit, true})
+        .demand((std::round)(config.half_period / T) >= S(8), "half_period", config.half_period,
+                "must be at least 8 samples");
   }
   if (config.response_time > S(0)) {
     rules
-        .require((std::round)(config.response_time / T) >= S(1), "response_time",
-                 config.response_time, "must be at least one sample")
-        .require(config.response_time < config.time_limit,
-                 {"response_time", config.response_time, "must be below time_limit", -1,
-                  config.time_limit, true});
+        .demand((std::round)(config.response_time / T) >= S(1), "response_time",
+                config.response_time, "must be at least one sample")
+        .demand(config.response_time < config.time_limit,
+                {"response_time", config.response_time, "must be below time_limit", -1,
+                 config.time_limit, true});
   }
-  rules.require(!(config.fastest * T > config.response),
-                {"fastest", config.fastest, "must be at most response in a sample:", -1,
-                 config.response / T, true});
+  rules.demand(!(config.fastest * T > config.response),
+               {"fastest", config.fastest, "must be at most response in a sample:", -1,
+                config.response / T, true});
   const S power = Order == 1 ? T : S(T * T);
   rules.representable("sample_time", T, power, "has a power that the scalar cannot hold");
   if (!rules) return rules.error();

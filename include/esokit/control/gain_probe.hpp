@@ -63,15 +63,15 @@ class GainProbe {
         .positive("sample_time", config.sample_time)
         .positive("amplitude", config.amplitude)
         .positive("travel", config.travel)
-        .require(6 <= config.periods && config.periods <= 200, "periods",
-                 static_cast<S>(config.periods), "must be 6 .. 200");
+        .demand(6 <= config.periods && config.periods <= 200, "periods",
+                static_cast<S>(config.periods), "must be 6 .. 200");
     if (!rules) return rules.error();
     const S x = config.observer_bandwidth * config.sample_time;
     rules
-        .require(!(x > S(1)), {"observer_bandwidth", config.observer_bandwidth,
-                               "times sample_time must be at most", -1, S(1), true})
-        .require(S(5) / x < S(1 << 24), "observer_bandwidth", config.observer_bandwidth,
-                 "makes half a period longer than 2^24 samples");
+        .demand(!(x > S(1)), {"observer_bandwidth", config.observer_bandwidth,
+                              "times sample_time must be at most", -1, S(1), true})
+        .demand(S(5) / x < S(1 << 24), "observer_bandwidth", config.observer_bandwidth,
+                "makes half a period longer than 2^24 samples");
     if (!rules) return rules.error();
     const auto limiter = Limiter<S>::make(config.limits, config.sample_time);
     if (!limiter) return limiter.error();

@@ -168,17 +168,17 @@ class HealthMonitor {
         .positive("input_range", config.input_range)
         .not_negative("noise", config.noise)
         .positive("memory", config.memory)
-        .require(1 <= config.divider && config.divider <= 1000, "divider",
-                 static_cast<S>(config.divider), "must be 1 .. 1000");
+        .demand(1 <= config.divider && config.divider <= 1000, "divider",
+                static_cast<S>(config.divider), "must be 1 .. 1000");
     if (!rules) return rules.error();
     const S step = config.sample_time * static_cast<S>(config.divider);
     rules
-        .require(!(config.observer_bandwidth * step > S(1)),
-                 {"divider", static_cast<S>(config.divider),
-                  "is too large: omega_o T D must be at most", -1, S(1), true})
-        .require(!(config.memory < S(8) / config.observer_bandwidth),
-                 {"memory", config.memory, "must be at least 8 / omega_o, that is", -1,
-                  S(8) / config.observer_bandwidth, true});
+        .demand(!(config.observer_bandwidth * step > S(1)),
+                {"divider", static_cast<S>(config.divider),
+                 "is too large: omega_o T D must be at most", -1, S(1), true})
+        .demand(!(config.memory < S(8) / config.observer_bandwidth),
+                {"memory", config.memory, "must be at least 8 / omega_o, that is", -1,
+                 S(8) / config.observer_bandwidth, true});
     if (!rules) return rules.error();
     return HealthMonitor(config);
   }

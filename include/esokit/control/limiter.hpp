@@ -38,7 +38,7 @@ class Limiter {
     rules.positive("sample_time", sample_time)
         .finite("limits.lower", limits.lower)
         .finite("limits.upper", limits.upper)
-        .require(
+        .demand(
             all(limits.lower < limits.upper),
             {"limits.lower", limits.lower, "must be below limits.upper", -1, limits.upper, true})
         .positive("limits.rate", limits.rate);

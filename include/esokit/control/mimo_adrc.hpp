@@ -340,16 +340,17 @@ class MimoAdrc {
     return norm;
   }
 
-  template <std::size_t... I>
+  template <std::size_t... Index>
   static Expected<MimoAdrc, Error<S>> make_channels(const Config& config,
                                                     const InputMatrix& inverse,
                                                     const S& sample_time,
-                                                    std::index_sequence<I...>) {
+                                                    std::index_sequence<Index...>) {
     std::tuple<Expected<Observers, Error<S>>...> observers{make_observer<Observers>(
-        std::get<I>(config.observers), sample_time, static_cast<int>(I))...};
-    std::tuple<Expected<AdrcLaw<Observers::order, S>, Error<S>>...> laws{
-        make_law(config, config.controller_bandwidths[I], sample_time, std::get<I>(observers))...};
-    std::tuple limiters{(static_cast<void>(I), Limiter<S>::make(config.limits[I], sample_time))...};
+        std::get<Index>(config.observers), sample_time, static_cast<int>(Index))...};
+    std::tuple<Expected<AdrcLaw<Observers::order, S>, Error<S>>...> laws{make_law(
+        config, config.controller_bandwidths[Index], sample_time, std::get<Index>(observers))...};
+    std::tuple limiters{
+        (static_cast<void>(Index), Limiter<S>::make(config.limits[Index], sample_time))...};
     const Error<S>* error = nullptr;
     int channel = -1;
     const auto look = [&](const auto& outcome, std::size_t i) {
@@ -357,16 +358,16 @@ class MimoAdrc {
       error = &outcome.error();
       channel = static_cast<int>(i);
     };
-    (look(std::get<I>(observers), I), ...);
-    (look(std::get<I>(laws), I), ...);
-    (look(std::get<I>(limiters), I), ...);
+    (look(std::get<Index>(observers), Index), ...);
+    (look(std::get<Index>(laws), Index), ...);
+    (look(std::get<Index>(limiters), Index), ...);
     if (error != nullptr) {
       Error<S> named = *error;
       named.index = channel;
       return named;
     }
-    return MimoAdrc({*std::get<I>(observers)...}, {*std::get<I>(laws)...},
-                    {*std::get<I>(limiters)...}, config, inverse);
+    return MimoAdrc({*std::get<Index>(observers)...}, {*std::get<Index>(laws)...},
+                    {*std::get<Index>(limiters)...}, config, inverse);
   }
 
   template <class Observer>

@@ -48,7 +48,7 @@ class NonlinearFeedback {
       const auto row = static_cast<std::size_t>(i);
       // The largest slope for a_i <= 1, that of the linear part.
       const S slope = law.fal_[row].gain(S(0.0));
-      rules.require(
+      rules.demand(
           all(is_finite(slope)) &&
               all(is_finite(S(config.gains[row] * slope * law.inverse_input_gain_))),
           "linear_widths", config.linear_widths[row],
@@ -114,10 +114,10 @@ class NonlinearFeedback {
     return good;
   }
 
-  template <int... I>
-  NonlinearFeedback(const Config& config, std::integer_sequence<int, I...>)
+  template <int... Index>
+  NonlinearFeedback(const Config& config, std::integer_sequence<int, Index...>)
       : gains_(config.gains),
-        fal_{Fal<S>(std::get<I>(config.exponents), std::get<I>(config.linear_widths))...},
+        fal_{Fal<S>(std::get<Index>(config.exponents), std::get<Index>(config.linear_widths))...},
         inverse_input_gain_(S(1.0) / config.input_gain),
         input_gain_(config.input_gain) {}
 

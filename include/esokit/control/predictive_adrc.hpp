@@ -279,7 +279,7 @@ class PredictiveAdrc {
     const S samples = seconds / sample_time - S(1e-3);
     Rules<S> rules;
     rules.not_negative("start_hold", seconds)
-        .require(all(samples < S(1e6)), "start_hold", seconds, "must be 1e6 samples or less");
+        .demand(all(samples < S(1e6)), "start_hold", seconds, "must be 1e6 samples or less");
     if (!rules) return rules.error();
     std::uint32_t count = 0;
     while (!all(detail::integer<S>(count) >= samples)) ++count;

@@ -41,8 +41,8 @@ class Softening {
     const bool limited = limits.lower > Limits<S>{}.lower && limits.upper < Limits<S>{}.upper;
     if (!wanted.value_or(Order >= 3 && limited && first > S(0))) return soft;
     Rules<S> rules;
-    rules.require(limited, "soften", S(1), "needs limits.lower and limits.upper")
-        .require(first > S(0), "gains", first, "must be positive for soften", 0);
+    rules.demand(limited, "soften", S(1), "needs limits.lower and limits.upper")
+        .demand(first > S(0), "gains", first, "must be positive for soften", 0);
     if (!rules) return rules.error();
     soft.bandwidth_ = root(first);
     S power(1);
@@ -53,8 +53,8 @@ class Softening {
       const S damped = static_cast<S>(damping) * binomials[row] * power;
       const S k = law.gains()[row];
       soft.damped_[row - 1] = k < damped ? damped : k;
-      rules.require(is_finite(S(soft.damped_[row - 1] / law.input_gain())), "gains", first,
-                    "gives a softened law that the scalar cannot hold", 0);
+      rules.demand(is_finite(S(soft.damped_[row - 1] / law.input_gain())), "gains", first,
+                   "gives a softened law that the scalar cannot hold", 0);
     }
     if (!rules) return rules.error();
     return soft;

@@ -50,9 +50,9 @@ class TrackingDifferentiator {
     rules.positive("acceleration", config.acceleration)
         .positive("sample_time", config.sample_time)
         .not_negative("filter_time", config.filter_time)
-        .require(!(config.filter_time > S(0) && config.filter_time < config.sample_time),
-                 {"filter_time", config.filter_time, "must be 0 or not below sample_time, which is",
-                  -1, config.sample_time, true});
+        .demand(!(config.filter_time > S(0) && config.filter_time < config.sample_time),
+                {"filter_time", config.filter_time, "must be 0 or not below sample_time, which is",
+                 -1, config.sample_time, true});
     if (!rules) return rules.error();
     TrackingDifferentiator result(config);
     rules.representable("acceleration", config.acceleration,

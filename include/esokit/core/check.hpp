@@ -83,31 +83,34 @@ class [[nodiscard]] Rules {
   // cold call for size.
 
   /// Neither NaN nor infinite.
-  [[gnu::noinline]] constexpr Rules& finite(const char* field, const S& value, int index = -1) {
-    return require(all(is_finite(value)), field, value, "must be finite", index);
+  [[gnu::__noinline__]] constexpr Rules& finite(const char* field, const S& value, int index = -1) {
+    return demand(all(is_finite(value)), field, value, "must be finite", index);
   }
 
   /// Finite and above zero.
-  [[gnu::noinline]] constexpr Rules& positive(const char* field, const S& value, int index = -1) {
-    return require(all(is_finite(value)) && all(value > S(0.0)), field, value,
-                   "must be finite and positive", index);
+  [[gnu::__noinline__]] constexpr Rules& positive(const char* field, const S& value,
+                                                  int index = -1) {
+    return demand(all(is_finite(value)) && all(value > S(0.0)), field, value,
+                  "must be finite and positive", index);
   }
 
   /// Finite and zero or above.
-  [[gnu::noinline]] constexpr Rules& not_negative(const char* field, const S& value,
-                                                  int index = -1) {
-    return require(all(is_finite(value)) && all(value >= S(0.0)), field, value,
-                   "must be finite and not negative", index);
+  [[gnu::__noinline__]] constexpr Rules& not_negative(const char* field, const S& value,
+                                                      int index = -1) {
+    return demand(all(is_finite(value)) && all(value >= S(0.0)), field, value,
+                  "must be finite and not negative", index);
   }
 
   /// Finite and not zero; either sign.
-  [[gnu::noinline]] constexpr Rules& nonzero(const char* field, const S& value, int index = -1) {
-    return require(all(is_finite(value)) && all(detail::absolute(value) > S(0.0)), field, value,
-                   "must be finite and not zero (negative is fine)", index);
+  [[gnu::__noinline__]] constexpr Rules& nonzero(const char* field, const S& value,
+                                                 int index = -1) {
+    return demand(all(is_finite(value)) && all(detail::absolute(value) > S(0.0)), field, value,
+                  "must be finite and not zero (negative is fine)", index);
   }
 
   /// Usable as a divisor: neither it nor its inverse is zero, subnormal or infinite.
-  [[gnu::noinline]] constexpr Rules& invertible(const char* field, const S& value, int index = -1) {
+  [[gnu::__noinline__]] constexpr Rules& invertible(const char* field, const S& value,
+                                                    int index = -1) {
     nonzero(field, value, index);
     if (!outcome_) return *this;
     return representable(field, value, S(S(1.0) / value),
@@ -115,23 +118,24 @@ class [[nodiscard]] Rules {
   }
 
   /// Finite and above a limit, which the error carries.
-  [[gnu::noinline]] constexpr Rules& above(const char* field, const S& value, const S& limit) {
-    return require(all(is_finite(value)) && all(value > limit),
-                   {field, value, "must be finite and above", -1, limit, true});
+  [[gnu::__noinline__]] constexpr Rules& above(const char* field, const S& value, const S& limit) {
+    return demand(all(is_finite(value)) && all(value > limit),
+                  {field, value, "must be finite and above", -1, limit, true});
   }
 
   /// `derived` is a normal number: neither zero, subnormal nor infinite. The error names the config
   /// field from which it was computed.
-  [[gnu::noinline]] constexpr Rules& representable(const char* field, const S& value,
-                                                   const S& derived, const char* rule,
-                                                   int index = -1) {
-    return require(detail::normal(derived), field, value, rule, index);
+  [[gnu::__noinline__]] constexpr Rules& representable(const char* field, const S& value,
+                                                       const S& derived, const char* rule,
+                                                       int index = -1) {
+    return demand(detail::normal(derived), field, value, rule, index);
   }
 
   /// Zero, as in a config that does not mention the field.
-  [[gnu::noinline]] constexpr Rules& left_out(const char* field, const S& value, const char* rule) {
-    return require(all(is_finite(value)) && !all(detail::absolute(value) > S(0.0)), field, value,
-                   rule);
+  [[gnu::__noinline__]] constexpr Rules& left_out(const char* field, const S& value,
+                                                  const char* rule) {
+    return demand(all(is_finite(value)) && !all(detail::absolute(value) > S(0.0)), field, value,
+                  rule);
   }
 
   /// Each element of a list.
@@ -154,14 +158,14 @@ class [[nodiscard]] Rules {
   /// @}
 
   /// A rule of your own: an error of `value` unless `kept`.
-  constexpr Rules& require(bool kept, const char* field, const S& value, const char* rule,
-                           int index = -1) {
+  constexpr Rules& demand(bool kept, const char* field, const S& value, const char* rule,
+                          int index = -1) {
     if (!kept) break_by(field, value, rule, index);
     return *this;
   }
 
   /// The same with a complete error, which may carry a limit.
-  constexpr Rules& require(bool kept, const Error<S>& error) {
+  constexpr Rules& demand(bool kept, const Error<S>& error) {
     if (!kept) break_by(error);
     return *this;
   }
@@ -173,10 +177,10 @@ class [[nodiscard]] Rules {
     return *this;
   }
 
-  /// The rules of `check()`, which is called only if no rule was broken before.
+  /// The rules of a function, which is called only if no rule was broken before.
   template <class F>
-  constexpr Rules& and_then(const F& check) {
-    return outcome_ ? all_of(check()) : *this;
+  constexpr Rules& and_then(const F& rules) {
+    return outcome_ ? all_of(rules()) : *this;
   }
 
  private:
@@ -190,9 +194,9 @@ class [[nodiscard]] Rules {
   }
 
   template <class List, class F>
-  constexpr Rules& each(const List& values, const F& check) {
+  constexpr Rules& each(const List& values, const F& rule) {
     int i = 0;
-    for (const S& value : values) check(value, i++);
+    for (const S& value : values) rule(value, i++);
     return *this;
   }
 

@@ -43,7 +43,7 @@ struct Constant;
   };
 
 ESOKIT_MEMBER_NAME(traits)
-ESOKIT_MEMBER_NAME(check)
+ESOKIT_MEMBER_NAME(validate)
 
 /// The traits that T declares, or the defaults.
 template <class T, class Traits>

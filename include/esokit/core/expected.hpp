@@ -12,7 +12,7 @@ namespace esokit {
 
 namespace detail {
 
-struct Success {};
+struct Done {};
 struct ErrorOf {};
 
 /// A value or an error: what is copied as bytes, as nearly all that a `make` returns, in a union,
@@ -118,15 +118,15 @@ class [[nodiscard]] Expected {
   detail::Either<T, E> content_;
 };
 
-/// Success, or an error.
+/// Done, or an error.
 template <class E>
 class [[nodiscard]] Expected<void, E> {
  public:
   using value_type = void;  ///< a success carries no value
   using error_type = E;     ///< type of the error
 
-  /// Success.
-  constexpr Expected() noexcept : content_(detail::Success{}) {}
+  /// Done.
+  constexpr Expected() noexcept : content_(detail::Done{}) {}
   /// Implicit, so that `return error;` compiles.
   constexpr Expected(E error) : content_(detail::ErrorOf{}, std::move(error)) {}
 
@@ -150,7 +150,7 @@ class [[nodiscard]] Expected<void, E> {
   }
 
  private:
-  detail::Either<detail::Success, E> content_;
+  detail::Either<detail::Done, E> content_;
 };
 
 /// An Expected can be written to a stream, see has_text.

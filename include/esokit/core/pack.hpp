@@ -34,7 +34,7 @@ inline constexpr int register_lanes = register_bytes / static_cast<int>(sizeof(S
 /// wider than a register would be passed to functions by different ABI rules (-Wpsabi).
 template <class S, int Count>
 struct Registers {
-  typedef S Register __attribute__((vector_size(sizeof(S) * Count)));
+  typedef S Register __attribute__((__vector_size__(sizeof(S) * Count)));
 
   // GCC and Clang both allow an element of a vector type to be accessed through a pointer to its
   // element type.
@@ -101,7 +101,7 @@ ESOKIT_INLINE constexpr bool all_bits(const Bits& bits) noexcept {
 #if defined(__AVX__)
     if constexpr (words == 4) {
       if (!std::is_constant_evaluated()) {
-        typedef long long Words __attribute__((vector_size(32)));
+        typedef long long Words __attribute__((__vector_size__(32)));
         return __builtin_ia32_ptestc256(std::bit_cast<Words>(word), Words{-1, -1, -1, -1}) != 0;
       }
     }
@@ -353,7 +353,7 @@ inline constexpr int lane_count<Pack<S, Count>> = Count;
 namespace detail {
 
 template <class S, int Count>
-struct Absolute<Pack<S, Count>> {
+struct AbsoluteValue<Pack<S, Count>> {
   ESOKIT_INLINE static constexpr Pack<S, Count> of(const Pack<S, Count>& value) noexcept {
     return value.magnitude();
   }

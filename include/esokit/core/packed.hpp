@@ -380,15 +380,15 @@ class Packed : public detail::PackedTraits<
   /// @}
 
  private:
-  template <class Function, int... I>
-  constexpr Packed(const Function& lane, std::integer_sequence<int, I...>) noexcept
+  template <class Function, int... Index>
+  constexpr Packed(const Function& lane, std::integer_sequence<int, Index...>) noexcept
       : form_([&] {
           if constexpr (at_once) {
             auto form = detail::blank<Form>();
             for (int i = 0; i < Lanes; ++i) detail::set_lane(form, T(lane(i)), i);
             return form;
           } else {
-            return Form{{lane(I)...}};
+            return Form{{lane(Index)...}};
           }
         }()) {}
 

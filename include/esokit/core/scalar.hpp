@@ -198,11 +198,14 @@ struct LaneScalarOf<S> {
 template <class S>
 using LaneScalar = typename detail::LaneScalarOf<S>::type;
 
+// Here alone it has to be the bare name, with which a macro of Arduino's would take its way.
+#pragma push_macro("abs")
+#undef abs
 namespace detail {
 
 /// |x|, one instruction for plain scalars and packs; for a complex number `abs` is found by ADL.
 template <class T>
-struct Absolute {
+struct AbsoluteValue {
   static constexpr auto of(const T& value) noexcept {
 #if defined(__GNUC__)
     if constexpr (std::is_same_v<T, float>) return __builtin_fabsf(value);
@@ -216,9 +219,10 @@ struct Absolute {
     }
   }
 };
+#pragma pop_macro("abs")
 template <class T>
 constexpr auto absolute(const T& value) noexcept {
-  return Absolute<T>::of(value);
+  return AbsoluteValue<T>::of(value);
 }
 
 /// A constant in the scalar type; plain scalars convert at compile time.

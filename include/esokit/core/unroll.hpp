@@ -24,9 +24,9 @@
 /// nothing.
 
 #if defined(__GNUC__)
-#define ESOKIT_INLINE [[gnu::always_inline]] inline
-#define ESOKIT_INLINE_LAMBDA __attribute__((always_inline))
-#define ESOKIT_COLD [[gnu::noinline, gnu::cold]]
+#define ESOKIT_INLINE [[gnu::__always_inline__]] inline
+#define ESOKIT_INLINE_LAMBDA __attribute__((__always_inline__))
+#define ESOKIT_COLD [[gnu::__noinline__, gnu::__cold__]]
 #else
 #define ESOKIT_INLINE inline
 #define ESOKIT_INLINE_LAMBDA
@@ -44,8 +44,8 @@ namespace detail {
 /// Calls f(integral_constant<int, 0>), .., f(integral_constant<int, Count - 1>) in order.
 template <int Count, class Function>
 ESOKIT_INLINE constexpr void unroll(Function&& f) noexcept {
-  [&]<int... I>(std::integer_sequence<int, I...>) ESOKIT_INLINE_LAMBDA {
-    (f(std::integral_constant<int, I>{}), ...);
+  [&]<int... Index>(std::integer_sequence<int, Index...>) ESOKIT_INLINE_LAMBDA {
+    (f(std::integral_constant<int, Index>{}), ...);
   }
   (std::make_integer_sequence<int, Count>{});
 }

@@ -53,9 +53,9 @@ Expected<std::uint32_t, Error<S>> blanking_samples(const Config& config) {
   rules.not_negative("measurement_noise", config.measurement_noise)
       .not_negative("disturbance_noise", config.disturbance_noise);
   const bool noise = all(config.measurement_noise > S(0.0));
-  rules.require(noise == all(config.disturbance_noise > S(0.0)),
-                noise ? "disturbance_noise" : "measurement_noise", S(0.0),
-                "must be given together with the other noise level");
+  rules.demand(noise == all(config.disturbance_noise > S(0.0)),
+               noise ? "disturbance_noise" : "measurement_noise", S(0.0),
+               "must be given together with the other noise level");
   if (config.blanking) rules.not_negative("blanking", *config.blanking);
   if (!rules) return rules.error();
   if (config.blanking) {
@@ -82,12 +82,12 @@ Expected<AlgebraicGain<Size, S>, Error<S>> design_algebraic_gain(const Config& c
   Rules<S> rules;
   rules.not_negative("observer_bandwidth", bandwidth)
       .not_negative("frequency_shift", shift)
-      .require(all(bandwidth > S(0.0)) || !all(shift > S(0.0)) || config.allow_vanishing_gain,
-               "observer_bandwidth", bandwidth,
-               "must be above zero if frequency_shift is: the gains vanish (or set "
-               "allow_vanishing_gain)")
-      .require(0 <= config.start_index && config.start_index <= 1000000, "start_index",
-               integer<S>(config.start_index), "must be 0 .. 1000000");
+      .demand(all(bandwidth > S(0.0)) || !all(shift > S(0.0)) || config.allow_vanishing_gain,
+              "observer_bandwidth", bandwidth,
+              "must be above zero if frequency_shift is: the gains vanish (or set "
+              "allow_vanishing_gain)")
+      .demand(0 <= config.start_index && config.start_index <= 1000000, "start_index",
+              integer<S>(config.start_index), "must be 0 .. 1000000");
   if (!rules) return rules.error();
   const auto blanking = blanking_samples<Size, S>(config);
   if (!blanking) return blanking.error();

@@ -38,7 +38,7 @@ class ConstantGain {
   static Expected<ConstantGain, Error<S>> make(const char* field, const Spec& spec,
                                                const S& sample_time, int index = -1) {
     Rules<S> rules;
-    rules.all_of(Placement::template check<Size, S>(field, spec, index));
+    rules.all_of(Placement::template validate<Size, S>(field, spec, index));
     if (!rules) return rules.error();
     ConstantGain law;
     law.poles_ = Placement::template sample<Size, S>(spec, sample_time);

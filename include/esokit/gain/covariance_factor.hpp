@@ -184,8 +184,9 @@ class CovarianceFactor {
   /// The same in loops, for calls outside the hot path: the unrolled form takes a large part of a
   /// filter's compile time.
   template <class Transition = PascalTransition>
-  [[gnu::noinline]] constexpr void advance_seldom(const S& inflation, const CovarianceFactor& noise,
-                                                  const Transition& transition = {}) noexcept {
+  [[gnu::__noinline__]] constexpr void advance_seldom(const S& inflation,
+                                                      const CovarianceFactor& noise,
+                                                      const Transition& transition = {}) noexcept {
     advance_by<false, false>(inflation, noise, transition);
   }
 
@@ -214,7 +215,8 @@ class CovarianceFactor {
   }
 
   /// True if every D_i and L_ij differs by at most a share from that of `other`.
-  [[nodiscard]] constexpr bool near(const CovarianceFactor& other, const S& share) const noexcept {
+  [[nodiscard]] constexpr bool close_to(const CovarianceFactor& other,
+                                        const S& share) const noexcept {
     const auto close = [&share](const S& a, const S& b) {
       return all(detail::absolute(S(a - b)) <= share * detail::absolute(b));
     };
@@ -385,17 +387,19 @@ class CovarianceFactor {
   [[nodiscard]] ESOKIT_INLINE constexpr S transported(const PascalTransition&, int i,
                                                       int k) const noexcept {
     // Starts with the first term instead of zero, which would cost an addition.
-    S sum = k < i ? lower_[packed(i, k)] : S(pascal(k, i));
+    S sum = k < i ? lower_[packed(i, k)] : S(binomial(k, i));
     detail::repeat<Size, Unrolled>([&](auto j) ESOKIT_INLINE_LAMBDA {
       if (j <= i || j <= k) return;
       const S& l = lower_[packed(j, k)];
-      sum = sum + (pascal(j, i) == 1 ? l : pascal(j, i) == 2 ? S(l + l) : S(S(pascal(j, i)) * l));
+      sum = sum + (binomial(j, i) == 1   ? l
+                   : binomial(j, i) == 2 ? S(l + l)
+                                         : S(S(binomial(j, i)) * l));
     });
     return sum;
   }
 
   /// C(j, i) in the scalar type of tables.
-  static constexpr detail::TableScalar<S> pascal(int j, int i) noexcept {
+  static constexpr detail::TableScalar<S> binomial(int j, int i) noexcept {
     return binomial_table<Size, detail::TableScalar<S>>[index(j)][index(i)];
   }
 

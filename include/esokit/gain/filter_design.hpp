@@ -70,8 +70,8 @@ class FilterDesign {
     // within the bound: it can be twice the bound.
     rules.all_of(add_bounds(config, q, has_model ? Order : -1));
     const S& change = config.disturbance_bounds[Order];
-    rules.require(!has_model || all(change > S(0.0)), "disturbance_bounds", change,
-                  "must say by how much the model may change the disturbance in a sample", Order);
+    rules.demand(!has_model || all(change > S(0.0)), "disturbance_bounds", change,
+                 "must say by how much the model may change the disturbance in a sample", Order);
     if (!rules) return rules.error();
 
     // The unit of all variances: R, or without noise the largest variance of the config.
@@ -88,10 +88,10 @@ class FilterDesign {
       }
     }
     rules
-        .require(driven || all(r > S(0.0)), "measurement_variance", r,
-                 "must be positive if nothing disturbs the plant")
-        .require(driven || config.inflation_rule != InflationRule::adaptive, "disturbance_bounds",
-                 S(0.0), "(or process_covariance) must not be zero if the inflation is adaptive")
+        .demand(driven || all(r > S(0.0)), "measurement_variance", r,
+                "must be positive if nothing disturbs the plant")
+        .demand(driven || config.inflation_rule != InflationRule::adaptive, "disturbance_bounds",
+                S(0.0), "(or process_covariance) must not be zero if the inflation is adaptive")
         .all_of(check_way_back(config, q));
     if (!rules) return rules.error();
     const Array<S, N> units = scaled_units(plant, S(sqrt(unit)));

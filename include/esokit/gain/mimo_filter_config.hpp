@@ -43,8 +43,8 @@ Check<S> check_filter(const MimoExtendedStateFilterConfig<Orders, Inputs, S, Ext
   Rules<S> rules;
   rules.positive("sample_time", config.sample_time)
       .invertible("sample_time", config.sample_time)
-      .require(1 <= config.max_gap && config.max_gap <= 65000, "max_gap",
-               static_cast<S>(config.max_gap), "must be 1 .. 65000");
+      .demand(1 <= config.max_gap && config.max_gap <= 65000, "max_gap",
+              static_cast<S>(config.max_gap), "must be 1 .. 65000");
   for (int i = 0; i < outputs; ++i) {
     for (int j = 0; j < Inputs; ++j) {
       rules.finite("input_matrix", config.input_matrix(i, j), i * Inputs + j);
@@ -65,13 +65,13 @@ Check<S> check_filter(const MimoExtendedStateFilterConfig<Orders, Inputs, S, Ext
     }
   }
   rules
-      .require(largest_magnitude(config.input_matrix) > S(0), "input_matrix", S(0),
-               "must not be zero")
-      .require(config.inflation_rule != InflationRule::adaptive, "inflation_rule", S(0),
-               "must be fixed or none for several chains");
+      .demand(largest_magnitude(config.input_matrix) > S(0), "input_matrix", S(0),
+              "must not be zero")
+      .demand(config.inflation_rule != InflationRule::adaptive, "inflation_rule", S(0),
+              "must be fixed or none for several chains");
   rules.all_of(check_inflation<S>(config))
-      .require(config.mode != RiccatiMode::start_table, "mode", S(0),
-               "must be recursive or frozen for several chains");
+      .demand(config.mode != RiccatiMode::start_table, "mode", S(0),
+              "must be recursive or frozen for several chains");
   rules.all_of(check_covariance("measurement_covariance", config.measurement_covariance, false));
   if (config.process_covariance) {
     rules.all_of(check_covariance("process_covariance", *config.process_covariance, false));

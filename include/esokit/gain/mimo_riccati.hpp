@@ -108,7 +108,7 @@ struct MimoRiccati : ChainRows<Orders, Extension> {
     }
     factor.advance(growth, any_held ? Factor::nearest(held) : noise, step);
     prepare_all();
-    if (has_limit && factor.near(limit, S(1e-3))) stand();
+    if (has_limit && factor.close_to(limit, S(1e-3))) stand();
   }
 
   void prepare_all() noexcept {

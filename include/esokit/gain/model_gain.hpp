@@ -223,7 +223,7 @@ class ModelGain {
   template <SampledModel<S> Model>
   static Expected<ModelGain, Error<S>> make(const char* field, const Spec& spec, const Model& model,
                                             int index = -1) {
-    if (auto ok = Placement::template check<Size, S>(field, spec, index); !ok) return ok.error();
+    if (auto ok = Placement::template validate<Size, S>(field, spec, index); !ok) return ok.error();
     const S named = Placement::template representative<Size, S>(spec);
     ModelGain law;
     // Converts the gains of the part to those of the whole model.

@@ -16,9 +16,9 @@ template <Scalar S, class Config>
 Check<S> check_inflation(const Config& config) {
   Rules<S> rules;
   if (config.inflation_rule == InflationRule::fixed) {
-    rules.require(all(is_finite(config.inflation)) && all(config.inflation > S(0.0)), "inflation",
-                  config.inflation,
-                  "must be finite and positive; the plain Kalman filter is InflationRule::none");
+    rules.demand(all(is_finite(config.inflation)) && all(config.inflation > S(0.0)), "inflation",
+                 config.inflation,
+                 "must be finite and positive; the plain Kalman filter is InflationRule::none");
   } else {
     rules.left_out("inflation", config.inflation,
                    "must be left out unless inflation_rule is fixed");
@@ -38,14 +38,14 @@ Check<S> check_covariance(const char* field, const Matrix<S, N, N>& p, bool vari
   Rules<S> rules;
   for (int i = 0; i < N; ++i) {
     for (int j = 0; j < N; ++j) rules.finite(field, p(i, j), i * N + j);
-    rules.require(!variances || all(p(i, i) >= S(0.0)), field, p(i, i),
-                  "must be positive semidefinite", i * N + i);
+    rules.demand(!variances || all(p(i, i) >= S(0.0)), field, p(i, i),
+                 "must be positive semidefinite", i * N + i);
   }
   for (int i = 0; i < N; ++i) {
     for (int j = 0; j < i; ++j) {
       const S difference = absolute(S(p(i, j) - p(j, i)));
       const S bound = S(8.0) * rounding<S>() * absolute(p(i, j));
-      rules.require(all(difference <= bound), field, p(i, j), "must be symmetric", i * N + j);
+      rules.demand(all(difference <= bound), field, p(i, j), "must be symmetric", i * N + j);
     }
   }
   return rules;
@@ -64,10 +64,10 @@ Check<S> add_bounds(const Config& config, Matrix<S, N, N>& q, int twice = -1) {
     const S whole = i == twice ? S(bound + bound) : bound;
     q(i, i) = config.bound_factor * whole * whole;
     rules
-        .require(!config.process_covariance, "disturbance_bounds", bound,
-                 "must be left out if process_covariance is given", i)
-        .require(normal(q(i, i)), "disturbance_bounds", bound,
-                 "has a square that the scalar cannot hold", i);
+        .demand(!config.process_covariance, "disturbance_bounds", bound,
+                "must be left out if process_covariance is given", i)
+        .demand(normal(q(i, i)), "disturbance_bounds", bound,
+                "has a square that the scalar cannot hold", i);
   }
   return rules;
 }

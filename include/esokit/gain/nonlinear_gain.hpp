@@ -14,8 +14,8 @@ namespace esokit {
 /// What an even gain can do besides k(x), declared in a member `static constexpr EvenGainTraits
 /// traits{..}`.
 struct EvenGainTraits {
-  bool checks = false;    ///< `check() const` gives the error of a bad parameter, as a Check
-  bool prepares = false;  ///< `prepared() const` gives a function object that is faster to call
+  bool validates = false;  ///< `validate() const` gives the error of a bad parameter, as a Check
+  bool prepares = false;   ///< `prepared() const` gives a function object that is faster to call
 };
 
 namespace detail {
@@ -27,11 +27,12 @@ inline constexpr EvenGainTraits even_gain_traits = declared_traits<Shape, EvenGa
 
 }  // namespace detail
 
-/// `check()` exists if and only if `traits.checks` declares it.
+/// `validate()` exists if and only if `traits.validates` declares it.
 template <class Shape, class S>
 concept ChecksAsDeclared = detail::as_declared(
-    detail::even_gain_traits<Shape>.checks, detail::names_check<Shape>, requires(const Shape& k) {
-      { k.check() } -> std::same_as<Check<S>>;
+    detail::even_gain_traits<Shape>.validates, detail::names_validate<Shape>,
+    requires(const Shape& k) {
+      { k.validate() } -> std::same_as<Check<S>>;
     });
 
 /// `prepared()` exists if and only if `traits.prepares` declares it.
@@ -55,7 +56,7 @@ concept EvenGain = std::copyable<Shape> && requires(const Shape& k, const S& x) 
 /// = 1, which makes the observer linear.
 template <Scalar S>
 struct PowerSumGain {
-  static constexpr EvenGainTraits traits{.checks = true, .prepares = true};  ///< besides k
+  static constexpr EvenGainTraits traits{.validates = true, .prepares = true};  ///< besides k
   template <class T>
   using with_scalar = PowerSumGain<T>;  ///< the same with another scalar
 
@@ -86,7 +87,7 @@ struct PowerSumGain {
   [[nodiscard]] S operator()(const S& x) const noexcept { return prepared()(x); }
 
   /// An error for a parameter out of its range; called by `make` of the observer.
-  [[nodiscard]] Check<S> check() const {
+  [[nodiscard]] Check<S> validate() const {
     return Rules<S>{}
         .not_negative("shape.gain_alpha", gain_alpha)
         .positive("shape.alpha", alpha)
@@ -102,7 +103,7 @@ inline constexpr std::uint32_t type_tag<PowerSumGain<S>> = make_type_tag<S>("Pow
 /// k(x) = K max(x, delta)^(a-1): K fal(e) / e of Han's observers.
 template <Scalar S>
 struct FalGain {
-  static constexpr EvenGainTraits traits{.checks = true, .prepares = true};  ///< besides k
+  static constexpr EvenGainTraits traits{.validates = true, .prepares = true};  ///< besides k
   template <class T>
   using with_scalar = FalGain<T>;  ///< the same with another scalar
 
@@ -128,7 +129,7 @@ struct FalGain {
   [[nodiscard]] S operator()(const S& x) const noexcept { return prepared()(x); }
 
   /// An error for a parameter out of its range; called by `make` of the observer.
-  [[nodiscard]] Check<S> check() const {
+  [[nodiscard]] Check<S> validate() const {
     return Rules<S>{}
         .not_negative("shape.gain", gain)
         .positive("shape.exponent", exponent)

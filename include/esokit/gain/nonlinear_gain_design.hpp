@@ -39,8 +39,8 @@ inline constexpr int tested_octaves = 40;
 /// octave.
 template <Scalar S, class Shape>
 Check<S> check_shape(const Shape& shape) {
-  if constexpr (even_gain_traits<Shape>.checks) {
-    if (auto ok = shape.check(); !ok) return ok.error();
+  if constexpr (even_gain_traits<Shape>.validates) {
+    if (auto ok = shape.validate(); !ok) return ok.error();
   }
   const auto k = prepared(shape);
   constexpr const char* rule = "is a magnitude (in error scales) at which the gain is not finite";
@@ -82,8 +82,8 @@ Expected<Interval<S>, Error<S>> find_limits(const GainLimits<S>& asked, const Ga
   Rules<S> rules;
   if (asked.lower) rules.not_negative("gain_min", *asked.lower);
   if (asked.upper) rules.positive("gain_max", *asked.upper);
-  if (asked.lower) rules.require(!asked.unlimited, "gain_min", *asked.lower, unlimited);
-  if (asked.upper) rules.require(!asked.unlimited, "gain_max", *asked.upper, unlimited);
+  if (asked.lower) rules.demand(!asked.unlimited, "gain_min", *asked.lower, unlimited);
+  if (asked.upper) rules.demand(!asked.unlimited, "gain_max", *asked.upper, unlimited);
   if (!rules) return rules.error();
   if (asked.unlimited) return Interval<S>{-widest, widest};
   const S three_quarters_down = S(0.25) * (S(1.0) + S(3.0) * least_with_one);

@@ -24,7 +24,7 @@ struct BandwidthPlacement {
 
   /// An error for a bandwidth that is not finite or not positive.
   template <int Size, Scalar S>
-  static Check<S> check(const char* field, const S& bandwidth, int index = -1) {
+  static Check<S> validate(const char* field, const S& bandwidth, int index = -1) {
     return Rules<S>{}.positive(field, bandwidth, index);
   }
 

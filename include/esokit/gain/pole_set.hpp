@@ -137,17 +137,17 @@ struct PoleSet {
   /// its conjugate.
   /// @param set number of the set in an array of sets; the error then counts poles through all sets
   template <int Size, PlainScalar S>
-  static Check<S> check(const char* field, const Spec<Size, S>& poles, int set = -1) {
+  static Check<S> validate(const char* field, const Spec<Size, S>& poles, int set = -1) {
     const int first = set < 0 ? 0 : set * Size;
     Rules<S> rules;
     for (std::size_t i = 0; i < Size; ++i) {
       const int index = first + static_cast<int>(i);
       const S real = poles[i].real();
       const S imaginary = poles[i].imag();
-      rules.require(is_finite(real), field, real, "must have a finite real part", index)
-          .require(is_finite(imaginary), field, imaginary, "must have a finite imaginary part",
-                   index)
-          .require(real < S(0), field, real, "must have a negative real part", index);
+      rules.demand(is_finite(real), field, real, "must have a finite real part", index)
+          .demand(is_finite(imaginary), field, imaginary, "must have a finite imaginary part",
+                  index)
+          .demand(real < S(0), field, real, "must have a negative real part", index);
     }
     for (std::size_t i = 0; i < Size; ++i) {
       if (poles[i].imag() == S(0)) continue;
@@ -156,8 +156,8 @@ struct PoleSet {
         balance += poles[j] == poles[i] ? 1 : 0;
         balance -= poles[j] == std::conj(poles[i]) ? 1 : 0;
       }
-      rules.require(balance == 0, field, poles[i].imag(),
-                    "is complex without its conjugate in the set", first + static_cast<int>(i));
+      rules.demand(balance == 0, field, poles[i].imag(),
+                   "is complex without its conjugate in the set", first + static_cast<int>(i));
     }
     return rules;
   }

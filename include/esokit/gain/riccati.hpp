@@ -124,9 +124,9 @@ Array<S, Size> alternating_response(const PascalTransition&) {
   for (int j = 0; j < Size; ++j) {
     S sum = j == 0 ? S(1.0) : S(0.0);
     for (int i = 0; i < j; ++i) {
-      const auto& pascal = binomial_table<Size, detail::TableScalar<S>>;
+      const auto& binomials = binomial_table<Size, detail::TableScalar<S>>;
       sum = sum + response[static_cast<std::size_t>(i)] *
-                      S(pascal[static_cast<std::size_t>(j)][static_cast<std::size_t>(i)]);
+                      S(binomials[static_cast<std::size_t>(j)][static_cast<std::size_t>(i)]);
     }
     response[static_cast<std::size_t>(j)] = S(-0.5) * sum;
   }

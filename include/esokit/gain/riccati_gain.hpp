@@ -325,7 +325,7 @@ class RiccatiGain {
            diagonal_noise_ == detail::of_lane(diagonal_noise_, 0);
   }
 
-  [[gnu::noinline]] constexpr void recur() noexcept {
+  [[gnu::__noinline__]] constexpr void recur() noexcept {
     const bool had_correction = (since_ & corrected) != 0;
     const bool in_gap = since_ == gapped || since_ == (gapped | watched);
     note(had_correction ? 0 : gapped);
@@ -369,7 +369,7 @@ class RiccatiGain {
   }
 
   /// `recur` for the usual case, after a correction.
-  [[gnu::noinline]] constexpr void recur_from_correction() noexcept {
+  [[gnu::__noinline__]] constexpr void recur_from_correction() noexcept {
     now_.factor.set_variance(0, S(now_.factor.variance(0) * now_.rest));
     advance_factor(noise_);
     take_factor();
@@ -433,7 +433,7 @@ class RiccatiGain {
   /// the gain is not enough: a nearly deadbeat gain tells little about the covariance, which
   /// decides whether recurring gaps are stable.
   ESOKIT_COLD constexpr void stand_if_close() noexcept {
-    if (!now_.factor.near(limit_.factor, S(1e-3))) return;
+    if (!now_.factor.close_to(limit_.factor, S(1e-3))) return;
     note(standing);
     place_ = done;
     now_ = limit_;

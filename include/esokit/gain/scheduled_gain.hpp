@@ -78,9 +78,9 @@ class ScheduledGain {
   Check<S> set_speed(const S& factor) noexcept {
     Rules<S> rules;
     rules
-        .require(is_finite(factor) && factor >= lowest_,
-                 {"speed", factor, "must be finite and at least", -1, lowest_, true})
-        .require(factor <= highest_, {"speed", factor, "must be at most", -1, highest_, true});
+        .demand(is_finite(factor) && factor >= lowest_,
+                {"speed", factor, "must be finite and at least", -1, lowest_, true})
+        .demand(factor <= highest_, {"speed", factor, "must be at most", -1, highest_, true});
     if (!rules) return rules.error();
     interpolate(std::log(factor / lowest_) * per_log_);
     return {};

@@ -79,7 +79,7 @@ class InnovationsFit {
         if (trial.mean_square < best.mean_square) {
           const double gain = 1.0 - trial.mean_square / best.mean_square;
           best = trial;
-          damping = std::max(damping * 0.2, 1e-9);
+          damping = (std::max)(damping * 0.2, 1e-9);
           better = true;
           // A hundredth of the change that changes the likelihood by one.
           if (gain * static_cast<double>(best.rows) < 0.02) best.converged = true;
@@ -147,7 +147,7 @@ class InnovationsFit {
     const TimedColumn& column = data_.timed[c];
     const double T = data_.sample_time;
     // A delay of less than half a row would see the corners of the straight lines.
-    const double step = 0.5 * T, square = std::max(0.1 * column.lag_square, 0.25 * T * T);
+    const double step = 0.5 * T, square = (std::max)(0.1 * column.lag_square, 0.25 * T * T);
     const auto slope = [&](const std::vector<double>& up, const std::vector<double>& down,
                            double by) {
       std::vector<double> change(up.size());
@@ -157,7 +157,7 @@ class InnovationsFit {
     const auto late = [&](double longer, double more) {
       return detail::late(column, data_.starts, T, longer, more);
     };
-    const double less = std::min(square, column.lag_square);
+    const double less = (std::min)(square, column.lag_square);
     return {slope(late(step, 0.0), late(-step, 0.0), 2.0 * step),
             slope(late(0.0, square), late(0.0, -less), square + less)};
   }
@@ -187,14 +187,15 @@ class InnovationsFit {
   /// zero does not count: `split_errors` tells how large they may be.
   [[nodiscard]] bool at_bound(const FitPoint& p) const {
     return p.latency >= bounds_.latency_max * 0.999 ||
-           (model_.pole && std::abs(p.pole) * p.latency >= bounds_.pole_latency * 0.999);
+           (model_.pole && (std::abs)(p.pole) * p.latency >= bounds_.pole_latency * 0.999);
   }
 
   /// The point, limited to the bounds.
   [[nodiscard]] FitPoint inside(FitPoint p) const {
     p.bandwidth = std::clamp(p.bandwidth, bounds_.bandwidth_min, bounds_.bandwidth_max);
     p.latency = std::clamp(p.latency, bounds_.latency_min, bounds_.latency_max);
-    p.lag_share = std::clamp(p.lag_share, std::min(0.1 * data_.sample_time / p.latency, 1.0), 1.0);
+    p.lag_share =
+        std::clamp(p.lag_share, (std::min)(0.1 * data_.sample_time / p.latency, 1.0), 1.0);
     const double most = bounds_.pole_latency / p.latency;
     p.pole = model_.pole ? std::clamp(p.pole, -0.1 * most, most) : 0.0;
     return p;
@@ -252,9 +253,9 @@ class InnovationsFit {
   static void normal_equations(std::span<const std::vector<double>> jacobian,
                                const std::vector<double>& residual, std::vector<double>& normal,
                                std::vector<double>& right, std::size_t from = 0,
-                               std::size_t to = std::numeric_limits<std::size_t>::max()) {
+                               std::size_t to = (std::numeric_limits<std::size_t>::max)()) {
     const std::size_t n = jacobian.size();
-    to = std::min(to, residual.size());
+    to = (std::min)(to, residual.size());
     normal.assign(n * n, 0.0);
     right.assign(n, 0.0);
     const std::size_t count = to - from;
@@ -277,13 +278,13 @@ class InnovationsFit {
     double first = 0.0, all = 0.0;
     std::size_t rest = 0;
     for (std::size_t k = from + 1; k < to; ++k) {
-      const double move = std::abs(u[k] - u[k - 1]);
+      const double move = (std::abs)(u[k] - u[k - 1]);
       if (all <= 0.0) rest = k - 1 - from;
       all += move;
       if (k <= from + most) first += move;
     }
     const double share = static_cast<double>(most) / static_cast<double>(to - from);
-    return first > std::max(0.1, 3.0 * share) * all ? rest : most;
+    return first > (std::max)(0.1, 3.0 * share) * all ? rest : most;
   }
 
   static constexpr std::array<double, 4> longest_step = {1.0, 0.7, 0.4, 0.2};
@@ -300,7 +301,8 @@ class InnovationsFit {
     p.latency *= std::exp(move[1]);
     // The effect of lag in exchange for dead time is quadratic, so the step is in its square:
     // otherwise the derivative at zero lag would vanish.
-    if (move[2] != 0.0) p.lag_share = std::sqrt(std::max(p.lag_share * p.lag_share + move[2], 0.0));
+    if (move[2] != 0.0)
+      p.lag_share = std::sqrt((std::max)(p.lag_share * p.lag_share + move[2], 0.0));
     if (move[1] != 0.0 || move[3] != 0.0) p.pole = (product + move[3]) / p.latency;
     p = inside(p);
     if (move[1] == 0.0 && move[3] == 0.0) p.pole = before.pole;

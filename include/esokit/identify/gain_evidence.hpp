@@ -45,8 +45,8 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
     const auto bin = static_cast<std::size_t>(
         std::upper_bound(edges.begin(), edges.end(), along[k]) - edges.begin());
     GainInRange& range = result.schedule[bin];
-    range.from = std::min(range.from, along[k]);
-    range.to = std::max(range.to, along[k]);
+    range.from = (std::min)(range.from, along[k]);
+    range.to = (std::max)(range.to, along[k]);
     ++range.rows;
     mean += along[k] / static_cast<double>(along.size());
     if (bin > 0) {
@@ -68,8 +68,8 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
       const Fit found = fit.at(plateau.points[i].fit.at);
       if (low.empty()) low = high = found.linear;
       for (std::size_t c = 0; c < low.size(); ++c) {
-        low[c] = std::min(low[c], found.linear[c]);
-        high[c] = std::max(high[c], found.linear[c]);
+        low[c] = (std::min)(low[c], found.linear[c]);
+        high[c] = (std::max)(high[c], found.linear[c]);
       }
       if (i == plateau.middle) {
         value = found.linear;
@@ -91,14 +91,14 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
   // One of several ranges may differ by chance: all together must differ by more than chance, and
   // one by more than its interval.
   for (std::size_t bin = 0; bin < result.schedule.size(); ++bin) {
-    const double off = std::abs(value[bin] - middle) / error[bin];
+    const double off = (std::abs)(value[bin] - middle) / error[bin];
     square += off * off;
-    most = std::max(most, off / t);
+    most = (std::max)(most, off / t);
   }
   const double freedom = static_cast<double>(result.schedule.size()) - 1.0;
   const double cube = 1.0 - 2.0 / (9.0 * freedom) + 1.645 * std::sqrt(2.0 / (9.0 * freedom));
   result.schedule_shift =
-      freedom > 0.0 ? std::min(most, std::sqrt(square / (freedom * cube * cube * cube))) : 0.0;
+      freedom > 0.0 ? (std::min)(most, std::sqrt(square / (freedom * cube * cube * cube))) : 0.0;
   FitData line = used;
   line.inputs.assign(1, std::vector<double>(along.size()));
   for (std::size_t k = 0; k < along.size(); ++k) line.inputs[0][k] = used.u[k] * (along[k] - mean);
@@ -116,7 +116,7 @@ constexpr double excitation_max = 0.15;
 /// twenty correlations is larger.
 inline double correlation_limit(const Identified& found, const IdentifyOptions& options) {
   const double rows = static_cast<double>(found.log.used) / found.averaged;
-  return std::max(options.correlation_max, 3.0 / std::sqrt(rows));
+  return (std::max)(options.correlation_max, 3.0 / std::sqrt(rows));
 }
 inline bool white(const Identified& found, const IdentifyOptions& options) {
   return found.correlation <= correlation_limit(found, options);
@@ -135,7 +135,7 @@ inline bool informed(const Identified& found) {
   if (!second.informative()) return false;
   return found.latency.value >= half_row(found) ||
          (found.order >= 2 && second.explained >= 0.95 && !(found.lead.time > 0.0) &&
-          std::abs(second.input_gain.value / found.input_gain.value - 1.0) <= 0.1);
+          (std::abs)(second.input_gain.value / found.input_gain.value - 1.0) <= 0.1);
 }
 
 /// Half width that b0 of a plateau within two octaves of the lowest bandwidth needs. There every
@@ -146,14 +146,14 @@ inline double reach_above(const Plateau& plateau, double bandwidth_min) {
   const Fit& here = plateau.points[plateau.middle].fit;
   double reach = 0.0;
   if (here.at.bandwidth > 4.0 * bandwidth_min) return reach;
-  const std::size_t high = std::min(plateau.middle + 8, plateau.points.size() - 1);
+  const std::size_t high = (std::min)(plateau.middle + 8, plateau.points.size() - 1);
   for (std::size_t i = plateau.middle + 1; i <= high; ++i) {
     const PlateauPoint& point = plateau.points[i];
     const double gained = 0.5 * static_cast<double>(point.fit.rows) *
                           std::log(here.mean_square / point.fit.mean_square);
     if (point.at_bound || !(gained > 10.0)) continue;
-    const double apart = std::abs(point.fit.linear[0] - here.linear[0]);
-    reach = std::max(reach, apart - student_95(19) * point.errors.linear[0]);
+    const double apart = (std::abs)(point.fit.linear[0] - here.linear[0]);
+    reach = (std::max)(reach, apart - student_95(19) * point.errors.linear[0]);
   }
   return reach;
 }
@@ -165,12 +165,12 @@ inline double reach_above(const Plateau& plateau, double bandwidth_min) {
 inline Estimate widened(const Identified& found, const IdentifyOptions& options) {
   Estimate gain = found.input_gain;
   const auto reach = [&](double to) {
-    gain.half_width = std::max(gain.half_width, std::abs(to - gain.value));
+    gain.half_width = (std::max)(gain.half_width, (std::abs)(to - gain.value));
   };
   const bool coloured = !white(found, options);
-  if (coloured) gain.half_width += 0.01 * std::abs(gain.value);
+  if (coloured) gain.half_width += 0.01 * (std::abs)(gain.value);
   // When exactly the machine stands is not known, and that moves b0 by some per cent.
-  if (found.held > 0.0) gain.half_width += 0.1 * std::abs(gain.value);
+  if (found.held > 0.0) gain.half_width += 0.1 * (std::abs)(gain.value);
   if (informed(found) && (coloured || gain.share() > options.interval_max))
     reach(found.second_opinion.input_gain.value);
   const Estimate& moving = found.in_motion.moving;

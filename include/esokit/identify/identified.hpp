@@ -94,7 +94,7 @@ struct PositionForce {
   }
   /// A bound on its error, 95 %, as if all factors were wrong together.
   [[nodiscard]] double half_width(double y) const {
-    const double x = std::abs((std::clamp(y, low, high) - middle) / size);
+    const double x = (std::abs)((std::clamp(y, low, high) - middle) / size);
     return x * (factors[0].half_width + x * (factors[1].half_width + x * factors[2].half_width));
   }
 };
@@ -188,13 +188,13 @@ struct Identified {
     static_assert(Parts.sensor == 0 && Parts.first_order == 0 && !Parts.follows_speed,
                   "esokit: identify finds no sensor, no first-order disturbances and no speed");
     Rules<double> rules;
-    rules.require(order == Parts.order,
-                  {"order", static_cast<double>(order), "is not the requested order, which is", -1,
-                   static_cast<double>(Parts.order), true});
+    rules.demand(order == Parts.order,
+                 {"order", static_cast<double>(order), "is not the requested order, which is", -1,
+                  static_cast<double>(Parts.order), true});
     const auto count = static_cast<std::size_t>(Parts.resonators);
-    rules.require(sinusoids.size() >= count, {"sinusoids", static_cast<double>(sinusoids.size()),
-                                              "were found, fewer than the requested resonators:",
-                                              -1, static_cast<double>(Parts.resonators), true});
+    rules.demand(sinusoids.size() >= count, {"sinusoids", static_cast<double>(sinusoids.size()),
+                                             "were found, fewer than the requested resonators:", -1,
+                                             static_cast<double>(Parts.resonators), true});
     if (!rules) return rules.error();
     typename AugmentedModel<Parts>::Settings settings;
     if constexpr (Parts.plant_poles) settings.plant[Parts.order - 1] = pole.value;

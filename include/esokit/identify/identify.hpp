@@ -148,12 +148,12 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
   // If the innovations of the rows are nearly white, their fast part gives the noise.
   if (raw_noise.value > 0.0) {
     result.noise = {raw_noise.value,
-                    std::max(raw_noise.half_width, result.noise.share() * raw_noise.value)};
+                    (std::max)(raw_noise.half_width, result.noise.share() * raw_noise.value)};
   }
   // The rounding of an encoder is not visible at rest.
   const double rounding = result.log.quantisation / std::sqrt(12.0);
   if (result.noise.low() < rounding) {
-    result.noise.half_width = std::max(result.noise.high() - rounding, result.noise.half_width);
+    result.noise.half_width = (std::max)(result.noise.high() - rounding, result.noise.half_width);
     result.noise.value = rounding;
   }
   progress(0.5);
@@ -194,8 +194,8 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
       const FitData other = with_friction(rows, speed, factor * chosen.friction_scale);
       InnovationsFit varied(other, model, bounds);
       const Fit found = varied.minimise(here.fit.at, false, 5);
-      low = std::min(low, found.linear[0]);
-      high = std::max(high, found.linear[0]);
+      low = (std::min)(low, found.linear[0]);
+      high = (std::max)(high, found.linear[0]);
     }
     friction_spread = high - low;
   }
@@ -206,7 +206,7 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
     add_position(other, result.position ? position_columns + 1 : 1);
     InnovationsFit varied(other, model, bounds);
     const Fit found = varied.minimise(here.fit.at, false, 5);
-    position_spread = std::abs(found.linear[0] - here.fit.linear[0]);
+    position_spread = (std::abs)(found.linear[0] - here.fit.linear[0]);
   }
   // The interval combines the jackknife with the dependence on the bandwidth: between neighbours,
   // and over one and a half octaves to each side as far as the number is accurate there. `down` is
@@ -217,15 +217,15 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
     const PlateauPoint& below = of.points[of.middle - 1];
     const PlateauPoint& above = of.points[of.middle + 1];
     const double x = value(middle);
-    const std::size_t first = of.middle - std::min(of.middle, down);
-    const std::size_t last = std::min(of.middle + 3, of.points.size() - 1);
+    const std::size_t first = of.middle - (std::min)(of.middle, down);
+    const std::size_t last = (std::min)(of.middle + 3, of.points.size() - 1);
     const double spread =
-        std::max({value(below), x, value(above)}) - std::min({value(below), x, value(above)});
+        (std::max)({value(below), x, value(above)}) - (std::min)({value(below), x, value(above)});
     double squares = 0.0, weights = 0.0;
     for (std::size_t i = first; i <= last; ++i) {
       const PlateauPoint& point = of.points[i];
       // A point that is more accurate than this one, or has no error, does not count more.
-      const double size = std::max({error(point), error(middle), resolved * std::abs(x)});
+      const double size = (std::max)({error(point), error(middle), resolved * (std::abs)(x)});
       const double weight = size > 0.0 && !point.at_bound ? 1.0 / (size * size) : 0.0;
       squares += weight * (value(point) - x) * (value(point) - x);
       weights += weight;
@@ -246,19 +246,19 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
   // compared over three octaves below, where the machine is closer to the model, and to 2 %.
   result.input_gain = gain(6, 0.02);
   result.input_gain.half_width =
-      std::max(result.input_gain.half_width, reach_above(plateau, bounds.bandwidth_min));
+      (std::max)(result.input_gain.half_width, reach_above(plateau, bounds.bandwidth_min));
   // What else could change b0 is compared with the interval of this plateau: a wider one would hide
   // it.
-  const double near = gain(3, 0.0).half_width;
+  const double half_width = gain(3, 0.0).half_width;
   // Less than a per cent does no harm, however sharp the interval is.
   result.position_shift =
-      position_spread / std::max(near, 0.01 * std::abs(result.input_gain.value));
+      position_spread / (std::max)(half_width, 0.01 * (std::abs)(result.input_gain.value));
   // A standard error is half of a half width.
-  result.friction_shift = 2.0 * friction_spread / near;
+  result.friction_shift = 2.0 * friction_spread / half_width;
   // The fit cannot distinguish times below a twentieth of a row.
   const auto time_of = [&](const Plateau& of, auto value, auto error) {
     Estimate found = estimate_of(of, value, error, 0.0);
-    found.half_width = std::max(found.half_width, 0.05 * rows.sample_time);
+    found.half_width = (std::max)(found.half_width, 0.05 * rows.sample_time);
     return found;
   };
   const auto time = [&](auto value, auto error) { return time_of(of_all, value, error); };
@@ -348,7 +348,7 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
   }
   double excitation = std::numeric_limits<double>::infinity();
   for (const PlateauPoint& point : plateau.points) {
-    excitation = std::min(excitation, point.errors.linear[0] / std::abs(point.fit.linear[0]));
+    excitation = (std::min)(excitation, point.errors.linear[0] / (std::abs)(point.fit.linear[0]));
   }
   result.excitation = excitation;
   // The fit of output error is blind where the plant integrates or a force depends on y: nearer to
@@ -365,7 +365,7 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
     if (result.held > 0.0) {
       // Where it holds, small u does little: that is known already.
       GainBySize& sizes = result.by_size;
-      if (std::abs(sizes.small.value) < std::abs(sizes.large.value)) sizes = {};
+      if ((std::abs)(sizes.below.value) < (std::abs)(sizes.above.value)) sizes = {};
     } else if (model.order == 2) {
       if (speed.empty()) speed = friction_speed(rows, 2, chosen.fit.noise, chosen.fit.at.latency);
       result.in_motion = gain_in_motion(used, model, bounds, here.fit, speed);
@@ -376,7 +376,7 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
   // The margins of a design have to hold for it, too.
   if (const double unseen = half_row(result) - result.latency.value;
       unseen > 0.0 && !white(result, options) && informed(result)) {
-    result.latency.half_width = std::max(result.latency.half_width, unseen);
+    result.latency.half_width = (std::max)(result.latency.half_width, unseen);
   }
   return result;
 }
@@ -385,11 +385,11 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
 /// it must help much, b0 must agree with that of the plain rows, and a row must be short.
 inline bool better(const Identified& averaged, const Identified& plain, const Identified& best,
                    const IdentifyOptions& options) {
-  const double apart = std::abs(averaged.input_gain.value - plain.input_gain.value);
+  const double apart = (std::abs)(averaged.input_gain.value - plain.input_gain.value);
   const double span = averaged.averaged * averaged.log.sample_time;
   return (white(averaged, options) || averaged.correlation < 0.5 * best.correlation) &&
          apart <= averaged.input_gain.half_width + plain.input_gain.half_width &&
-         span * std::abs(averaged.pole.value) < 0.2;
+         span * (std::abs)(averaged.pole.value) < 0.2;
 }
 
 }  // namespace detail
@@ -411,17 +411,17 @@ inline bool better(const Identified& averaged, const Identified& plain, const Id
   Rules<double> rules;
   const auto number = [](auto value) { return static_cast<double>(value); };
   rules
-      .require(0 <= options.extension && options.extension <= 2, "extension",
-               number(options.extension), "must be 0 (chosen), 1 or 2")
-      .require(2 <= options.schedule_bins && options.schedule_bins <= 20, "schedule_bins",
-               number(options.schedule_bins), "must be 2 to 20")
-      .require(0 <= options.averaged, "averaged", number(options.averaged),
-               "must be 0 (chosen), 1 or more")
-      .require(0 <= options.sinusoids, "sinusoids", number(options.sinusoids),
-               "must not be negative")
+      .demand(0 <= options.extension && options.extension <= 2, "extension",
+              number(options.extension), "must be 0 (chosen), 1 or 2")
+      .demand(2 <= options.schedule_bins && options.schedule_bins <= 20, "schedule_bins",
+              number(options.schedule_bins), "must be 2 to 20")
+      .demand(0 <= options.averaged, "averaged", number(options.averaged),
+              "must be 0 (chosen), 1 or more")
+      .demand(0 <= options.sinusoids, "sinusoids", number(options.sinusoids),
+              "must not be negative")
       // Twenty stretches of at least 50 rows; of fewer rows they would overlap.
-      .require(1000 <= options.rows_max, "rows_max", number(options.rows_max),
-               "must be at least 1000");
+      .demand(1000 <= options.rows_max, "rows_max", number(options.rows_max),
+              "must be at least 1000");
   if (!rules) return rules.error();
   // The scheduling column is processed like the columns, as the last of them.
   const auto with_schedule = [&] {
@@ -506,23 +506,22 @@ inline bool better(const Identified& averaged, const Identified& plain, const Id
   Rules<double> rules;
   const double T = found.log.sample_time;
   const double jitter = log.time.empty() ? found.log.jitter / T : 0.0;
-  rules.require(
-      jitter <= 0.05, "jitter", jitter,
-      "is the jitter over T without time stamps, above 0.05: record the time of each row");
-  rules.require(options.applied || found.log.saturated < 0.5, "saturated", found.log.saturated,
-                "is the share of rows with u at its limits: record the u that the actuator held");
-  rules.require(found.own_input > detail::own_input_min, "own_input", found.own_input,
-                "is the share of u that does not follow from y, which is too small: record a "
-                "moving reference");
-  rules.require(!found.at_once, "at_once", found.latency.value,
-                "is the latency found, but y follows u at once: is y an acceleration or a force? "
-                "Record its speed or position, or more rows per second");
+  rules.demand(jitter <= 0.05, "jitter", jitter,
+               "is the jitter over T without time stamps, above 0.05: record the time of each row");
+  rules.demand(options.applied || found.log.saturated < 0.5, "saturated", found.log.saturated,
+               "is the share of rows with u at its limits: record the u that the actuator held");
+  rules.demand(found.own_input > detail::own_input_min, "own_input", found.own_input,
+               "is the share of u that does not follow from y, which is too small: record a "
+               "moving reference");
+  rules.demand(!found.at_once, "at_once", found.latency.value,
+               "is the latency found, but y follows u at once: is y an acceleration or a force? "
+               "Record its speed or position, or more rows per second");
   const bool excited = found.plateau.middle > 0 && found.excitation < detail::excitation_max;
-  rules.require(excited, "excitation", found.plateau.middle > 0 ? found.excitation : 1.0,
-                "is the smallest relative error of b0 and too large: what of y follows from u is "
-                "not told from the rest; record several steps that last until y settles, or a "
-                "sweep");
-  rules.require(
+  rules.demand(excited, "excitation", found.plateau.middle > 0 ? found.excitation : 1.0,
+               "is the smallest relative error of b0 and too large: what of y follows from u is "
+               "not told from the rest; record several steps that last until y settles, or a "
+               "sweep");
+  rules.demand(
       !(found.rival.left < 1.0 / std::numbers::e), "order", static_cast<double>(found.order),
       "is the order, but where b0 was found another one leaves less than 1 / e of the mean square: "
       "give that one, or a y of this one (a position under a motor has order 2, a speed 1)");
@@ -531,43 +530,42 @@ inline bool better(const Identified& averaged, const Identified& plain, const Id
   const bool informed = detail::informed(found);
   const double widest = informed ? options.interval_agreed : options.interval_max;
   // A lead does no harm if b0 is nearly the same without it. Feedback from y makes small ones up.
-  const double off = std::abs(found.lead.input_gain - found.input_gain.value);
+  const double off = (std::abs)(found.lead.input_gain - found.input_gain.value);
   const double harmless =
-      std::max(found.input_gain.half_width, 0.1 * std::abs(found.input_gain.value));
-  rules.require(!(found.lead.time > 0.0) || (off <= harmless && found.input_gain.share() <= widest),
-                "lead", found.lead.time,
-                "is the time by which y moves before u: is u logged late?");
-  rules.require(detail::white(found, options) || informed,
-                {"correlation", found.correlation,
-                 "is the correlation of the innovations, so the model lacks something, and output "
-                 "error does not tell b0 either: record longer, with steps of u that last until y "
-                 "settles, or add known effects as columns; must be at most",
-                 -1, detail::correlation_limit(found, options), true});
-  rules.require(!informed || second.agrees(found.input_gain.value),
-                {"second_opinion", found.input_gain.value / second.input_gain.value,
-                 "is b0 over that of output error: they must agree by 0.6 to 1.7"});
-  rules.require(!found.at_bound, "latency", found.latency.value,
-                "(or the pole) is at the end of its range: record faster changes of u");
-  rules.require(found.plateau.spread <= options.plateau_max,
-                {"plateau", found.plateau.spread,
-                 "is the relative change of b0 between neighbouring bandwidths, so there is no "
-                 "plateau: record more motion in the band of the controller; must be at most",
-                 -1, options.plateau_max, true});
-  rules.require(options.scheduled || found.schedule_shift <= 1.0, "schedule", found.schedule_shift,
-                "is the change of b0 along the scheduling column over its interval: ask for b0 "
-                "over the column (scheduled = true), or record at one setting");
-  rules.require(found.position_shift <= options.position_shift_max,
-                {"position_shift", found.position_shift,
-                 "is the change of b0 in half widths if a force depends on y, so gravity or a "
-                 "spring is missing: add it as a column (sin y, y), or record motion with more "
-                 "frequencies; must be at most",
-                 -1, options.position_shift_max, true});
-  rules.require(found.friction_shift <= options.friction_shift_max,
-                {"friction_shift", found.friction_shift,
-                 "is the change of b0 between two scales of friction in standard errors: record "
-                 "faster motion; must be at most",
-                 -1, options.friction_shift_max, true});
-  rules.require(
+      (std::max)(found.input_gain.half_width, 0.1 * (std::abs)(found.input_gain.value));
+  rules.demand(!(found.lead.time > 0.0) || (off <= harmless && found.input_gain.share() <= widest),
+               "lead", found.lead.time, "is the time by which y moves before u: is u logged late?");
+  rules.demand(detail::white(found, options) || informed,
+               {"correlation", found.correlation,
+                "is the correlation of the innovations, so the model lacks something, and output "
+                "error does not tell b0 either: record longer, with steps of u that last until y "
+                "settles, or add known effects as columns; must be at most",
+                -1, detail::correlation_limit(found, options), true});
+  rules.demand(!informed || second.agrees(found.input_gain.value),
+               {"second_opinion", found.input_gain.value / second.input_gain.value,
+                "is b0 over that of output error: they must agree by 0.6 to 1.7"});
+  rules.demand(!found.at_bound, "latency", found.latency.value,
+               "(or the pole) is at the end of its range: record faster changes of u");
+  rules.demand(found.plateau.spread <= options.plateau_max,
+               {"plateau", found.plateau.spread,
+                "is the relative change of b0 between neighbouring bandwidths, so there is no "
+                "plateau: record more motion in the band of the controller; must be at most",
+                -1, options.plateau_max, true});
+  rules.demand(options.scheduled || found.schedule_shift <= 1.0, "schedule", found.schedule_shift,
+               "is the change of b0 along the scheduling column over its interval: ask for b0 "
+               "over the column (scheduled = true), or record at one setting");
+  rules.demand(found.position_shift <= options.position_shift_max,
+               {"position_shift", found.position_shift,
+                "is the change of b0 in half widths if a force depends on y, so gravity or a "
+                "spring is missing: add it as a column (sin y, y), or record motion with more "
+                "frequencies; must be at most",
+                -1, options.position_shift_max, true});
+  rules.demand(found.friction_shift <= options.friction_shift_max,
+               {"friction_shift", found.friction_shift,
+                "is the change of b0 between two scales of friction in standard errors: record "
+                "faster motion; must be at most",
+                -1, options.friction_shift_max, true});
+  rules.demand(
       found.input_gain.share() <= widest,
       {"interval", found.input_gain.share(),
        "is the half width of b0 over b0: record longer or with larger steps; must be at most", -1,

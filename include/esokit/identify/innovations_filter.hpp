@@ -27,7 +27,7 @@ struct Estimate {
   [[nodiscard]] double high() const { return value + half_width; }  ///< upper end
 
   /// Half width divided by the magnitude.
-  [[nodiscard]] double share() const { return half_width / std::abs(value); }
+  [[nodiscard]] double share() const { return half_width / (std::abs)(value); }
 };
 
 /// Rows with a constant sample time, for the fit.
@@ -190,10 +190,10 @@ struct InnovationsFilter {
     const double w = point.bandwidth;
     const int n = model.order;
     // The states are y^(i) / w^i, so that the entries are of similar size.
-    const double tau = std::max(point.lag(), 0.05 * T);
+    const double tau = (std::max)(point.lag(), 0.05 * T);
     f.w = w, f.pole = point.pole, f.tau = tau, f.order = n;
     f.goes_on = data.one_load && data.starts.size() > 1 && N == n + 1;
-    double dead = std::max(point.latency - tau, 0.0);
+    double dead = (std::max)(point.latency - tau, 0.0);
     if (data.averaged > 1) dead += 0.5 * T / data.averaged;
     f.delay = static_cast<std::ptrdiff_t>(std::floor(dead / T));
     const double fraction = dead - static_cast<double>(f.delay) * T;
@@ -264,7 +264,7 @@ struct InnovationsFilter {
     });
     // The one that was found, or else the oldest, becomes the first.
     std::rotate(cached.begin(), known == cached.end() ? known - 1 : known,
-                std::min(known + 1, cached.end()));
+                (std::min)(known + 1, cached.end()));
     if (known == cached.end()) {
       auto fresh = std::make_shared<GainTable>();
       fresh->bandwidth = w;
@@ -304,7 +304,7 @@ struct InnovationsFilter {
     Variances p{};
     // Infinite at any w: the states are divided by w^i.
     const auto unknown = [q](std::size_t i) {
-      return 1e8 / std::min(std::pow(q, static_cast<double>(i)), 1.0);
+      return 1e8 / (std::min)(std::pow(q, static_cast<double>(i)), 1.0);
     };
     for (std::size_t i = 0; i < p.size(); ++i) p[i][i] = unknown(i);
     const std::vector<double> variances = recursion(q, data.y.size(), p, found.first.gains);
@@ -319,7 +319,7 @@ struct InnovationsFilter {
     const auto weigh = [&](const std::vector<double>& of, std::size_t blind,
                            std::vector<double>& weights) {
       for (const double s : of) weights.push_back(std::sqrt(found.steady_variance / s));
-      std::fill_n(weights.begin(), std::min(of.size(), blind), 0.0);
+      std::fill_n(weights.begin(), (std::min)(of.size(), blind), 0.0);
     };
     weigh(variances, static_cast<std::size_t>(N), found.first.weights);
     if (!goes_on) return;
@@ -327,7 +327,7 @@ struct InnovationsFilter {
     double gap = 0.0;
     if (data.start_times.size() == data.starts.size()) {
       const double rows = (data.start_times.back() - data.start_times.front()) / data.sample_time;
-      gap = std::max(rows - static_cast<double>(data.starts.back()), 0.0) /
+      gap = (std::max)(rows - static_cast<double>(data.starts.back()), 0.0) /
             static_cast<double>(data.starts.size() - 1);
     }
     const double load = found.waited[0].back() + q * gap;
@@ -344,19 +344,19 @@ struct InnovationsFilter {
                                 std::vector<double>& gains) const {
     std::vector<double> variances;
     Vector before{};
-    const double small = 1e-9 * std::sqrt(q);
+    const double negligible = 1e-9 * std::sqrt(q);
     while (variances.size() < most) {
       const double s = p[0][0] + 1.0;
       Vector k{};
       for (std::size_t i = 0; i < k.size(); ++i) k[i] = p[i][0] / s;
       double change = 0.0;
       for (std::size_t i = 0; i < k.size(); ++i) {
-        change = std::max(change, std::abs(k[i] - before[i]) / (std::abs(k[i]) + 1e-300));
+        change = (std::max)(change, (std::abs)(k[i] - before[i]) / ((std::abs)(k[i]) + 1e-300));
       }
       before = k;
       gains.insert(gains.end(), k.begin(), k.end());
       variances.push_back(s);
-      if (variances.size() > static_cast<std::size_t>(2 * N) && change < small) break;
+      if (variances.size() > static_cast<std::size_t>(2 * N) && change < negligible) break;
       // p = phi (p - k k' s) phi' + q
       for (std::size_t i = 1; i < k.size(); ++i) {
         for (std::size_t j = 1; j < k.size(); ++j) p[i][j] -= k[i] * k[j] * s;
@@ -406,7 +406,7 @@ struct InnovationsFilter {
       s.weight = start.weights[before];
       return s;
     }
-    const auto& p = table->waited[std::min(waited, table->waited.size() - 1)];
+    const auto& p = table->waited[(std::min)(waited, table->waited.size() - 1)];
     double variance = 1.0;
     for (std::size_t i = 0; i < s.gain.size(); ++i) {
       for (std::size_t j = 0; j < s.gain.size(); ++j) s.gain[i] += p[i * N + j] * s.seen[j];
@@ -441,7 +441,7 @@ struct InnovationsFilter {
       };
       double v = u(from);
       double u_before = v, u_now = v;
-      const std::ptrdiff_t begin = std::min(from + static_cast<std::ptrdiff_t>(lead[piece]), to);
+      const std::ptrdiff_t begin = (std::min)(from + static_cast<std::ptrdiff_t>(lead[piece]), to);
       for (std::ptrdiff_t k = from; k < begin; ++k) {
         for (double* const to_run : out) to_run[k] = 0.0;
         const double u_next = u(k - delay + 1);
@@ -466,7 +466,7 @@ struct InnovationsFilter {
       Sight at;
       at.seen[0] = 1.0;
       for (std::ptrdiff_t k = begin; k < to; ++k) {
-        const std::size_t row = std::min(static_cast<std::size_t>(k - begin), steady);
+        const std::size_t row = (std::min)(static_cast<std::size_t>(k - begin), steady);
         const double* gain = start.gains.data() + row * static_cast<std::size_t>(N);
         double weight = start.weights[row];
         double value = data.y[static_cast<std::size_t>(k)];
@@ -495,7 +495,7 @@ struct InnovationsFilter {
           seen = false;
           ++waited;
         }
-        const std::ptrdiff_t after = std::min(k + 1, to - 1);
+        const std::ptrdiff_t after = (std::min)(k + 1, to - 1);
         Vector pushed;
         for (std::size_t j = 0; j < pushed.size(); ++j) {
           pushed[j] = lag[j] * v + previous[j] * u_before + current[j] * u_now + next[j] * u_next;

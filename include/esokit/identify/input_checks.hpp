@@ -18,18 +18,18 @@ namespace esokit {
 struct GainBySize {
   double knot = 0.0;  ///< half way between the smallest and the largest abs(u), unit of u; 0: u
                       ///< does not tell the two apart (it has two levels)
-  Estimate small{};   ///< b0 below
-  Estimate large{};   ///< b0 above
+  Estimate below{};   ///< b0 below it
+  Estimate above{};   ///< b0 above it
 
   /// Whether the two differ by a quarter, and by more than their intervals: the actuator saturates,
   /// or its effect is not proportional to u.
-  [[nodiscard]] bool differ() const { return knot > 0.0 && differs(small, large); }
+  [[nodiscard]] bool differ() const { return knot > 0.0 && differs(below, above); }
 
   /// Whether two numbers differ by a quarter, and by more than their intervals.
   [[nodiscard]] static bool differs(const Estimate& a, const Estimate& b) {
-    const double apart = std::abs(a.value - b.value);
+    const double apart = (std::abs)(a.value - b.value);
     return apart > a.half_width + b.half_width &&
-           apart > 0.25 * std::max(std::abs(a.value), std::abs(b.value));
+           apart > 0.25 * (std::max)((std::abs)(a.value), (std::abs)(b.value));
   }
 };
 
@@ -44,8 +44,8 @@ struct GainInMotion {
   /// that of the motion: friction holds the machine against u, and it matters.
   [[nodiscard]] bool differ() const {
     return still > 0.0 && GainBySize::differs(moving, at_rest) &&
-           std::abs(at_rest.value) < std::abs(moving.value) &&
-           std::abs(moving.value - all) > 0.1 * std::abs(all);
+           (std::abs)(at_rest.value) < (std::abs)(moving.value) &&
+           (std::abs)(moving.value - all) > 0.1 * (std::abs)(all);
   }
 };
 
@@ -79,7 +79,7 @@ inline GainInMotion gain_in_motion(const FitData& data, const FitModel& model,
   std::vector<double> held(data.u.size(), 0.0);
   std::size_t rows = 0;
   for (std::size_t k = 0; k < held.size(); ++k) {
-    if (std::abs(speed[k]) < slow) std::swap(held[k], split.u[k]), ++rows;
+    if ((std::abs)(speed[k]) < slow) std::swap(held[k], split.u[k]), ++rows;
   }
   if (rows == 0 || rows == held.size()) return {};
   split.inputs.push_back(std::move(held));
@@ -92,7 +92,7 @@ inline GainInMotion gain_in_motion(const FitData& data, const FitModel& model,
 inline GainBySize gain_by_size(const FitData& data, const FitModel& model, const FitBounds& bounds,
                                const FitPoint& at) {
   std::vector<double> sizes;
-  for (const double u : data.u) sizes.push_back(std::abs(u));
+  for (const double u : data.u) sizes.push_back((std::abs)(u));
   std::sort(sizes.begin(), sizes.end());
   // Without a fiftieth at each end, which may be peaks.
   const std::size_t few = sizes.size() / 50;
@@ -113,8 +113,8 @@ inline GainBySize gain_by_size(const FitData& data, const FitModel& model, const
   const double alone = product(split.u, split.u) * product(beyond, beyond);
   if (!(both * both < 0.999 * alone)) return {};
   split.inputs.push_back(std::move(beyond));
-  const auto [small, large] = two_gains(split, model, bounds, at);
-  return {knot, small, large};
+  const auto [below, above] = two_gains(split, model, bounds, at);
+  return {knot, below, above};
 }
 
 /// The lead of y, by a fit with u advanced by ten rows: it must leave less than three quarters of
@@ -127,7 +127,7 @@ inline Lead lead_of(const FitData& data, const FitModel& model, const FitBounds&
   for (std::size_t piece = 0; piece < data.starts.size(); ++piece) {
     const std::size_t to = piece + 1 < data.starts.size() ? data.starts[piece + 1] : data.u.size();
     for (std::size_t k = data.starts[piece]; k < to; ++k)
-      advanced.u[k] = data.u[std::min(k + rows, to - 1)];
+      advanced.u[k] = data.u[(std::min)(k + rows, to - 1)];
   }
   InnovationsFit fit(advanced, model, bounds);
   Fit best;
@@ -200,7 +200,7 @@ inline bool at_once(const FitData& data) {
   const LinearLaw law = linear_law({ones(data.y.size()), delayed(data.y, 1), delayed(data.u, 0),
                                     delayed(data.u, 1), delayed(data.u, 2)},
                                    delayed(data.y, 0));
-  return changes >= 4 && law.left < 0.1 && std::abs(law.factors[1]) < 0.3;
+  return changes >= 4 && law.left < 0.1 && (std::abs)(law.factors[1]) < 0.3;
 }
 
 }  // namespace detail

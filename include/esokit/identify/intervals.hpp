@@ -63,8 +63,8 @@ struct FitErrors {
                                                             const SplitCovariance& covariance,
                                                             double t, double longest = 0.0) {
   // The squared lag is between zero and the squared latency, so a larger error says nothing more.
-  longest = std::max(longest, at.latency);
-  const double square = std::min(longest * longest, t * std::sqrt(covariance.lag_square));
+  longest = (std::max)(longest, at.latency);
+  const double square = (std::min)(longest * longest, t * std::sqrt(covariance.lag_square));
   const double along = t * std::sqrt(covariance.latency);
   const double correlation =
       covariance.both / std::sqrt(covariance.latency * covariance.lag_square);
@@ -75,11 +75,11 @@ struct FitErrors {
   for (int i = 0; i < directions; ++i) {
     const double angle = 2.0 * std::numbers::pi * i / directions;
     const double latency =
-        std::max(at.latency + along * (shared * std::cos(angle) + alone * std::sin(angle)), 0.0);
-    const double tau =
-        std::min(std::sqrt(std::max(at.lag() * at.lag() + square * std::cos(angle), 0.0)), latency);
-    lag = std::max(lag, std::abs(tau - at.lag()));
-    dead_time = std::max(dead_time, std::abs(latency - tau - at.dead_time()));
+        (std::max)(at.latency + along * (shared * std::cos(angle) + alone * std::sin(angle)), 0.0);
+    const double tau = (std::min)(
+        std::sqrt((std::max)(at.lag() * at.lag() + square * std::cos(angle), 0.0)), latency);
+    lag = (std::max)(lag, (std::abs)(tau - at.lag()));
+    dead_time = (std::max)(dead_time, (std::abs)(latency - tau - at.dead_time()));
   }
   return {lag / t, dead_time / t};
 }
@@ -178,8 +178,9 @@ struct FitErrors {
   each_time([&](const TimedColumn& column, std::size_t i) {
     const std::size_t q = 5 + i - free;
     FitErrors::Times& found = errors.times[static_cast<std::size_t>(&column - timed.data())];
-    found.latency = std::max(column.latency - right[i], 0.0);
-    found.lag = std::min(std::sqrt(std::max(column.lag_square - right[i + 1], 0.0)), found.latency);
+    found.latency = (std::max)(column.latency - right[i], 0.0);
+    found.lag =
+        (std::min)(std::sqrt((std::max)(column.lag_square - right[i + 1], 0.0)), found.latency);
     found.covariance = {covariance(q, q), covariance(q + 1, q + 1), covariance(q, q + 1)};
   });
   return errors;

@@ -85,7 +85,7 @@ inline double quantisation_step(const std::vector<double>& y) {
   for (int pass = 0; pass < 3; ++pass) {
     double sum = 0.0, count = 0.0;
     for (const double difference : differences) {
-      const double multiple = std::round(difference / step);
+      const double multiple = (std::round)(difference / step);
       if (multiple >= 1.0 && multiple <= 3.0) sum += difference, count += multiple;
     }
     if (count > 0.0) step = sum / count;
@@ -93,7 +93,7 @@ inline double quantisation_step(const std::vector<double>& y) {
   std::size_t fits = 0;
   for (const double difference : differences) {
     const double multiple = difference / step;
-    if (std::abs(multiple - std::round(multiple)) < 0.15) ++fits;
+    if ((std::abs)(multiple - (std::round)(multiple)) < 0.15) ++fits;
   }
   return fits * 10 >= differences.size() * 9 ? step : 0.0;
 }
@@ -105,14 +105,15 @@ inline std::size_t mend_outliers(std::vector<double>& y) {
   if (count < 10) return 0;
   const auto stand_away = [&](std::size_t k, std::size_t length, double least) {
     const double before = y[k - 1], after = y[k + length], middle = 0.5 * (before + after);
-    const double jump = std::min(std::abs(y[k] - middle), std::abs(y[k + length - 1] - middle));
-    return jump > least && std::abs(after - before) < 0.2 * jump;
+    const double jump =
+        (std::min)((std::abs)(y[k] - middle), (std::abs)(y[k + length - 1] - middle));
+    return jump > least && (std::abs)(after - before) < 0.2 * jump;
   };
   // Distances from the middle of the neighbours, and which of them outliers may have made: these
   // do not tell what is usual.
   std::vector<double> distances, usual;
   for (std::size_t k = 1; k + 1 < count; ++k)
-    distances.push_back(std::abs(y[k] - 0.5 * (y[k - 1] + y[k + 1])));
+    distances.push_back((std::abs)(y[k] - 0.5 * (y[k - 1] + y[k + 1])));
   const auto quantile = [](std::vector<double> values, std::size_t percent) {
     const auto at = values.begin() + static_cast<std::ptrdiff_t>(values.size() * percent / 100);
     std::nth_element(values.begin(), at, values.end());
@@ -157,7 +158,7 @@ inline std::size_t bridge(std::vector<double>& column) {
     if (!good.empty()) steps.push_back(static_cast<double>(k - good.back()));
     good.push_back(k);
   }
-  const double longest = std::max(5.0, 3.0 * median(steps));
+  const double longest = (std::max)(5.0, 3.0 * median(steps));
   std::size_t found = 0;
   for (std::size_t i = 1; i < good.size(); ++i) {
     const std::size_t from = good[i - 1], to = good[i];
@@ -247,10 +248,10 @@ inline std::size_t bridge(std::vector<double>& column) {
   // Within these limits all squares and powers of T are finite.
   const auto size_fits = [&](const char* field, const std::vector<double>& values, int index = -1) {
     const auto [low, high] = std::minmax_element(values.begin(), values.end());
-    const double largest = std::max(-*low, *high);
-    rules.require(largest <= 1e60, field, largest, "is too large: use another unit", index)
-        .require(!(*high > *low) || *high - *low >= 1e-60, field, *high - *low,
-                 "is the range of its values, which is too small: use another unit", index);
+    const double largest = (std::max)(-*low, *high);
+    rules.demand(largest <= 1e60, field, largest, "is too large: use another unit", index)
+        .demand(!(*high > *low) || *high - *low >= 1e-60, field, *high - *low,
+                "is the range of its values, which is too small: use another unit", index);
   };
   size_fits("u", held_u);
   size_fits("y", y);
@@ -264,7 +265,7 @@ inline std::size_t bridge(std::vector<double>& column) {
     if (step < 1.6 * middle) sum += step, regular += 1.0;
   }
   const double T = log.time.empty() ? log.sample_time : sum / regular;
-  rules.require(T >= 1e-12 && T <= 1e12, "sample_time", T, "must be between 1e-12 s and 1e12 s");
+  rules.demand(T >= 1e-12 && T <= 1e12, "sample_time", T, "must be between 1e-12 s and 1e12 s");
   if (!rules) return rules.error();
   for (const double step : steps) {
     if (step < 1.6 * middle) square += (step - T) * (step - T);
@@ -330,16 +331,16 @@ inline std::size_t bridge(std::vector<double>& column) {
           double held = 0.0, at = t;
           while (held_at + 1 < held_u.size() && held_time[held_at + 1] <= t) ++held_at;
           for (std::size_t j = held_at; at < t + T; ++j) {
-            const double end = j + 1 < held_u.size() ? std::min(held_time[j + 1], t + T) : t + T;
-            held += held_u[j] * std::max(end - at, 0.0);
-            at = std::max(end, at);
+            const double end = j + 1 < held_u.size() ? (std::min)(held_time[j + 1], t + T) : t + T;
+            held += held_u[j] * (std::max)(end - at, 0.0);
+            at = (std::max)(end, at);
           }
           data.u.push_back(held / T);
         }
         // Each measurement to the nearest row, or the next if that has one.
         for (std::size_t g = 0, i = from; i < to; ++i) {
           const double rows_on = (time[i] - time[from]) / T;
-          const auto row = std::max(g, static_cast<std::size_t>(std::lround(rows_on)));
+          const auto row = (std::max)(g, static_cast<std::size_t>(std::lround(rows_on)));
           const double late = rows_on - size(row);
           if (row >= grid || late < -0.75) continue;
           data.measured[data.starts.back() + row] = y[i];
@@ -349,8 +350,8 @@ inline std::size_t bridge(std::vector<double>& column) {
       }
     }
     if (to < time.size()) {
-      const double rows_between = std::round((time[to] - time[to - 1]) / T) - 1.0;
-      report.missing += static_cast<std::size_t>(std::min(rows_between, 1e15));
+      const double rows_between = (std::round)((time[to] - time[to - 1]) / T) - 1.0;
+      report.missing += static_cast<std::size_t>((std::min)(rows_between, 1e15));
     }
     from = to;
   }
@@ -392,7 +393,7 @@ inline std::size_t bridge(std::vector<double>& column) {
     };
     start(piece, from);
     std::size_t next = piece + 1;
-    for (std::size_t k = from; k < std::min(from + length, data.y.size()); ++k) {
+    for (std::size_t k = from; k < (std::min)(from + length, data.y.size()); ++k) {
       if (next < data.starts.size() && data.starts[next] == k) {
         if (k > from) start(next, k);
         ++next;

@@ -33,15 +33,15 @@ struct MeasuredEffect {
   std::size_t lost = 0;         ///< rows in which w was missing, and lies between its neighbours
 
   /// Whether the log tells the gain: its interval does not contain zero.
-  [[nodiscard]] bool told() const { return gain.half_width < std::abs(gain.value); }
+  [[nodiscard]] bool told() const { return gain.half_width < (std::abs)(gain.value); }
   /// The settings of `Measured`, where w is held from its sample to the next: half a sample less of
   /// latency, first of dead time, then of lag.
   /// @param sample_time s @param input_latency how much later u acts than the observer knows, s:
   /// the law is told of w so much sooner
   [[nodiscard]] MeasuredInput<double> held(double sample_time, double input_latency = 0.0) const {
     const double less = 0.5 * sample_time + input_latency;
-    return {gain.value, std::max(lag.value - std::max(less - dead_time.value, 0.0), 0.0),
-            std::max(dead_time.value - less, 0.0)};
+    return {gain.value, (std::max)(lag.value - (std::max)(less - dead_time.value, 0.0), 0.0),
+            (std::max)(dead_time.value - less, 0.0)};
   }
 };
 
@@ -69,7 +69,7 @@ inline double share_left(const std::vector<double>& values, const std::vector<do
       xx += x * x, xy += x * y, yy += y * y;
       all += (values[order[i]] - mean) * (values[order[i]] - mean);
     }
-    left += std::max(yy - (xx > 0.0 ? xy * xy / xx : 0.0), 0.0);
+    left += (std::max)(yy - (xx > 0.0 ? xy * xy / xx : 0.0), 0.0);
   }
   return all > 0.0 ? left / all : 0.0;
 }
@@ -83,7 +83,7 @@ inline double share_beside(const std::vector<double>& values, const std::vector<
     const double x = of[k] - x0, y = values[k] - y0;
     xx += x * x, xy += x * y, yy += y * y;
   }
-  return yy > 0.0 && xx > 0.0 ? std::max(1.0 - xy * xy / (xx * yy), 0.0) : 1.0;
+  return yy > 0.0 && xx > 0.0 ? (std::max)(1.0 - xy * xy / (xx * yy), 0.0) : 1.0;
 }
 
 /// A column that follows another one leaves less than this share of its squares.
@@ -97,18 +97,17 @@ inline Check<double> tells_itself(const FitData& data, std::size_t c) {
   };
   const auto [low, high] = std::minmax_element(column.begin(), column.end());
   Rules<double> rules;
-  rules.require(*high > *low,
-                at(*low, "never changes, so nothing can be told of it: leave it out"));
-  rules.require(share_beside(column, data.u) > follows,
-                at(share_beside(column, data.u),
-                   "is the share of its squares that does not follow u, so the two cannot be told "
-                   "apart: move it by itself, or leave it out; must be above",
-                   follows, true));
+  rules.demand(*high > *low, at(*low, "never changes, so nothing can be told of it: leave it out"));
+  rules.demand(share_beside(column, data.u) > follows,
+               at(share_beside(column, data.u),
+                  "is the share of its squares that does not follow u, so the two cannot be told "
+                  "apart: move it by itself, or leave it out; must be above",
+                  follows, true));
   for (std::size_t other = 0; other < c; ++other) {
-    rules.require(share_beside(column, data.columns[other]) > 1e-3 * follows,
-                  at(static_cast<double>(other),
-                     "is the column that it follows, so the two cannot be told apart: leave one "
-                     "out"));
+    rules.demand(share_beside(column, data.columns[other]) > 1e-3 * follows,
+                 at(static_cast<double>(other),
+                    "is the column that it follows, so the two cannot be told apart: leave one "
+                    "out"));
   }
   return rules;
 }

@@ -39,7 +39,7 @@ inline std::vector<double> smoothed(const FitData& data, int half, int derivativ
         piece + 1 < data.starts.size() ? data.starts[piece + 1] : data.y.size());
     for (std::ptrdiff_t k = from; k < to; ++k) {
       const std::ptrdiff_t h = std::max<std::ptrdiff_t>(
-          std::min({static_cast<std::ptrdiff_t>(half), k - from, to - 1 - k}), derivative);
+          (std::min)({static_cast<std::ptrdiff_t>(half), k - from, to - 1 - k}), derivative);
       double sum = 0.0, weight = 0.0;
       for (std::ptrdiff_t i = -h; i <= h; ++i) {
         const double y = data.y[static_cast<std::size_t>(std::clamp(k + i, from, to - 1))];
@@ -64,7 +64,7 @@ inline double rms(const std::vector<double>& values) {
 inline double innovations_correlation(const std::vector<double>& e) {
   const auto found = correlations(e);
   double largest = 0.0;
-  for (const double value : found) largest = std::max(largest, std::abs(value));
+  for (const double value : found) largest = (std::max)(largest, (std::abs)(value));
   // A residual that is zero or not finite is no evidence of a good fit.
   return is_finite(found[0]) ? largest : std::numeric_limits<double>::infinity();
 }
@@ -82,7 +82,7 @@ inline std::vector<double> friction_speed(const FitData& data, int order, double
     // Until the noise is a tenth of the smallest scale.
     int half = 0;
     const double turn = 0.1 * friction_scales[0] * rms(data.y);
-    while (half < std::min(longest, 3) && noise / std::sqrt(2.0 * half + 1.0) > turn) ++half;
+    while (half < (std::min)(longest, 3) && noise / std::sqrt(2.0 * half + 1.0) > turn) ++half;
     return smoothed(data, half, 0);
   }
   int half = 2;
@@ -97,8 +97,8 @@ inline std::vector<double> friction_speed(const FitData& data, int order, double
 /// temperature) nothing may depend on where zero is.
 inline bool stops(const std::vector<double>& speed) {
   const auto [low, high] = std::minmax_element(speed.begin(), speed.end());
-  const double near = 0.02 * (*high - *low);
-  return *low <= near && *high >= -near;
+  const double band = 0.02 * (*high - *low);
+  return *low <= band && *high >= -band;
 }
 
 /// The data with an added column for friction, tanh(speed / scale).
@@ -141,7 +141,7 @@ inline void add_position(FitData& data, std::size_t from = 1) {
 inline FitBounds fit_bounds(const FitData& data, bool wide) {
   const double T = data.sample_time;
   const double duration = T * static_cast<double>(data.y.size());
-  return {6.0 / duration, 1.5 / T, 0.05 * T, std::min(200.0 * T, duration / (wide ? 12.0 : 30.0)),
+  return {6.0 / duration, 1.5 / T, 0.05 * T, (std::min)(200.0 * T, duration / (wide ? 12.0 : 30.0)),
           wide ? 0.9 : 0.5};
 }
 /// The best fit from several starts, with w free.
@@ -160,9 +160,9 @@ inline Fit best_fit(InnovationsFit& fit, int starts = 3) {
   best.mean_square = std::numeric_limits<double>::infinity();
   std::vector<double> tried;
   for (const Fit& start : grid) {
-    bool near = false;
-    for (const double latency : tried) near = near || latency == start.at.latency;
-    if (near) continue;
+    bool known = false;
+    for (const double latency : tried) known = known || latency == start.at.latency;
+    if (known) continue;
     if (static_cast<int>(tried.size()) == starts) break;
     tried.push_back(start.at.latency);
     const Fit found = fit.minimise(start.at, true, 8);
@@ -249,7 +249,7 @@ inline FitData with_friction(const FitData& data, const OrderFit& order) {
 inline void compare_orders(const FitData& data, std::vector<OrderFit>& orders) {
   if (orders.size() < 2) return;
   double least = std::numeric_limits<double>::infinity();
-  for (const OrderFit& order : orders) least = std::min(least, order.fit.at.bandwidth);
+  for (const OrderFit& order : orders) least = (std::min)(least, order.fit.at.bandwidth);
   for (OrderFit& order : orders) {
     const FitData used = with_friction(data, order);
     InnovationsFit fit(used, order.model, order.bounds);
@@ -284,9 +284,9 @@ inline std::vector<OrderFit> fit_orders(const FitData& data, const IdentifyOptio
 inline bool is_part_of(const OrderFit& lower, const OrderFit& higher) {
   const double pole = higher.fit.at.pole;
   if (lower.model.order + 1 != higher.model.order || !(higher.friction_scale > 0.0)) return false;
-  const auto near = [](double a, double b) { return 0.75 * b < a && a < b / 0.75; };
-  return near(higher.fit.linear[0] / pole / lower.fit.linear[0], 1.0) &&
-         near(1.0 / pole + higher.fit.at.latency, lower.fit.at.latency);
+  const auto alike = [](double a, double b) { return 0.75 * b < a && a < b / 0.75; };
+  return alike(higher.fit.linear[0] / pole / lower.fit.linear[0], 1.0) &&
+         alike(1.0 / pole + higher.fit.at.latency, lower.fit.at.latency);
 }
 
 /// The order with the best likelihood, unless another one leaves less than 1 / e of the mean square
@@ -326,8 +326,8 @@ inline Rival rival_of(const FitData& data, const std::vector<OrderFit>& orders, 
     FitPoint own = other.fit.at, exchanged = here.at;
     own.bandwidth = here.at.bandwidth;
     if (other.model.order > chosen) {
-      exchanged.pole = 1.0 / std::max(here.at.lag(), other.bounds.latency_min);
-      exchanged.latency = std::max(here.at.dead_time(), other.bounds.latency_min);
+      exchanged.pole = 1.0 / (std::max)(here.at.lag(), other.bounds.latency_min);
+      exchanged.latency = (std::max)(here.at.dead_time(), other.bounds.latency_min);
     } else if (here.at.pole > 0.0) {
       exchanged.pole = 0.0;
       exchanged.latency += 1.0 / here.at.pole;
@@ -366,7 +366,7 @@ inline std::optional<HeldLog> held_log(const FitData& rows, const FitModel& mode
     FitData cut = rows;
     std::size_t count = 0;
     for (std::size_t k = 0; k < speed.size(); ++k) {
-      if (std::abs(speed[k]) < still * size) cut.u[k] = 0.0, ++count;
+      if ((std::abs)(speed[k]) < still * size) cut.u[k] = 0.0, ++count;
     }
     const double share = static_cast<double>(count) / static_cast<double>(speed.size());
     if (count == 0 || share > held_max) continue;

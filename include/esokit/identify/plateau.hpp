@@ -68,9 +68,9 @@ struct Plateau {
     const auto [low, high] = std::minmax({b0(i - 1), b0(i), b0(i + 1)});
     double error = 0.0;
     for (std::size_t j = i - 1; j <= i + 1; ++j) {
-      error = std::max(error, plateau.points[j].errors.linear[0]);
+      error = (std::max)(error, plateau.points[j].errors.linear[0]);
     }
-    const double spread = (high - low) / std::abs(b0(i));
+    const double spread = (high - low) / (std::abs)(b0(i));
     const double size = spread * spread + error * error / (b0(i) * b0(i));
     if (size < least) {
       least = size;
@@ -85,7 +85,7 @@ struct Plateau {
   }
   std::size_t first = plateau.middle, last = plateau.middle;
   const auto within = [&](std::size_t i) {
-    return std::abs(b0(i) - b0(plateau.middle)) <= tolerance * std::abs(b0(plateau.middle));
+    return (std::abs)(b0(i) - b0(plateau.middle)) <= tolerance * (std::abs)(b0(plateau.middle));
   };
   while (first > 0 && within(first - 1)) --first;
   while (last + 1 < plateau.points.size() && within(last + 1)) ++last;

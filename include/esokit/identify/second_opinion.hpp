@@ -23,7 +23,7 @@ struct SecondOpinion {
 
   /// Whether it tells anything: u explains 70 %, and the half width is below half of b0.
   [[nodiscard]] bool informative() const {
-    return explained >= 0.7 && input_gain.half_width < 0.5 * std::abs(input_gain.value);
+    return explained >= 0.7 && input_gain.half_width < 0.5 * (std::abs)(input_gain.value);
   }
 
   /// Whether b0 is close enough to this one to be the same.
@@ -38,7 +38,7 @@ struct SecondOpinion {
 [[nodiscard]] inline SecondOpinion second_opinion(const FitData& data, const FitModel& model,
                                                   FitBounds bounds, const FitPoint& at,
                                                   double bandwidth) {
-  bounds.bandwidth_min = std::min(bounds.bandwidth_min, bandwidth);
+  bounds.bandwidth_min = (std::min)(bounds.bandwidth_min, bandwidth);
   InnovationsFit fit(data, model, bounds);
   FitPoint start = at;
   start.bandwidth = bandwidth;

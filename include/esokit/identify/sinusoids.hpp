@@ -79,8 +79,8 @@ inline Line highest_line(const FitData& data, const std::vector<double>& e) {
   const double T = data.sample_time;
   double from = 0.0, to = 0.0;
   each_time(data, [&](std::size_t, double time) {
-    from = std::min(from, time);
-    to = std::max(to, time);
+    from = (std::min)(from, time);
+    to = (std::max)(to, time);
   });
   const double rows = (to - from) / T + 1.0;
   if (!(rows < most)) return {};
@@ -102,9 +102,9 @@ inline Line highest_line(const FitData& data, const std::vector<double>& e) {
   Line highest;
   // Up to the frequency at which the mean of two rows still represents a sine.
   for (std::size_t j = first; 10 * j < 8 * half; ++j) {
-    const std::size_t low = j > wide ? j - wide : 1, high = std::min(j + wide, half);
-    const std::size_t inner_low = std::max(low, j > own ? j - own : 1);
-    const std::size_t inner_high = std::min(high, j + own);
+    const std::size_t low = j > wide ? j - wide : 1, high = (std::min)(j + wide, half);
+    const std::size_t inner_low = (std::max)(low, j > own ? j - own : 1);
+    const std::size_t inner_high = (std::min)(high, j + own);
     const double count = static_cast<double>((high - low) - (inner_high - inner_low));
     if (count < 20.0) continue;
     const double beside = (sums[high] - sums[low]) - (sums[inner_high] - sums[inner_low]);
@@ -126,7 +126,7 @@ inline double amplitude_of(const FitData& data, const std::vector<double>& value
   each_time(data, [&](std::size_t k, double time) {
     sum += (values[k] - mean) * std::polar(1.0, -frequency * time);
   });
-  return 2.0 * std::abs(sum) / static_cast<double>(values.size());
+  return 2.0 * (std::abs)(sum) / static_cast<double>(values.size());
 }
 
 /// A sine that is fitted together with the linear parameters: amplitude, and correction of its
@@ -144,7 +144,7 @@ inline FittedSine fit_sine(const FitData& data, const FitModel& model, const Fit
   const std::size_t c = 1 + data.inputs.size() + data.columns.size();
   FittedSine found;
   double wide = 0.0;
-  each_time(data, [&](std::size_t, double time) { wide = std::max(wide, std::abs(time)); });
+  each_time(data, [&](std::size_t, double time) { wide = (std::max)(wide, (std::abs)(time)); });
   for (int pass = 0; pass < 5; ++pass) {
     FitData with = data;
     add_sine(with, model.order, frequency);
@@ -162,7 +162,7 @@ inline FittedSine fit_sine(const FitData& data, const FitModel& model, const Fit
     const Fit last = tuned.at(point);
     const double change = std::clamp(last.linear[c + 2], -1.0 / wide, 1.0 / wide);
     found.gain = static_cast<double>(before.rows) * std::log(before.mean_square / last.mean_square);
-    const bool settled = std::abs(change) < 1e-4 / wide;
+    const bool settled = (std::abs)(change) < 1e-4 / wide;
     if (settled || pass == 4) {
       const FitErrors errors = jackknife(tuned, last, false);
       const double amplitude = std::hypot(a, b);
@@ -193,10 +193,10 @@ inline std::vector<double> find_sines(FitData data, const FitModel& model, const
     if (!(line.height > 2.0 * std::log(rows))) break;
     const FittedSine swing = fit_sine(data, model, bounds, point, line.frequency);
     const double frequency = swing.sine.frequency.value;
-    const double driven = std::abs(found.input_gain()) * amplitude_of(data, data.u, frequency);
+    const double driven = (std::abs)(found.input_gain()) * amplitude_of(data, data.u, frequency);
     const Estimate& amplitude = swing.sine.amplitude;
     if (!(swing.gain > 5.0 * std::log(rows)) ||
-        !(amplitude.value > std::max(0.2 * driven, 3.0 * amplitude.half_width)))
+        !(amplitude.value > (std::max)(0.2 * driven, 3.0 * amplitude.half_width)))
       break;
     frequencies.push_back(frequency);
     add_sine(data, model.order, frequency);

@@ -24,7 +24,7 @@ struct TimedColumn {
   /// The lag, s.
   [[nodiscard]] double lag() const { return std::sqrt(lag_square); }
   /// The dead time, s.
-  [[nodiscard]] double dead_time() const { return std::max(latency - lag(), 0.0); }
+  [[nodiscard]] double dead_time() const { return (std::max)(latency - lag(), 0.0); }
 };
 
 namespace detail {
@@ -75,7 +75,7 @@ inline std::vector<double> late(const std::vector<double>& measured,
 /// The same with the times of the column, moved by so much.
 inline std::vector<double> late(const TimedColumn& column, const std::vector<std::size_t>& starts,
                                 double T, double longer = 0.0, double square = 0.0) {
-  const double lag = std::sqrt(std::max(column.lag_square + square, 0.0));
+  const double lag = std::sqrt((std::max)(column.lag_square + square, 0.0));
   return late(column.measured, starts, T, lag, column.latency + longer - lag);
 }
 

@@ -95,7 +95,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
                           "with this model gives a gain that the scalar cannot hold");
     }
     for (const S& x : model.step_) {
-      rules.require(is_finite(x), "model", x, "gives a transition that the scalar cannot hold");
+      rules.demand(is_finite(x), "model", x, "gives a transition that the scalar cannot hold");
     }
     if (!rules) return rules.error();
     return model;

@@ -104,36 +104,36 @@ struct LinearPlant {
       for (int j = 0; j < k; ++j) {
         row = row - config.denominator[static_cast<std::size_t>(States - k + j)] * plant.b(j);
       }
-      rules.require(all(is_finite(row)), "numerator", row,
-                    "gives, with this denominator, a state that the scalar cannot hold",
-                    States - 1 - k);
+      rules.demand(all(is_finite(row)), "numerator", row,
+                   "gives, with this denominator, a state that the scalar cannot hold",
+                   States - 1 - k);
       plant.b(k) = row;
     }
-    rules.require(any, "numerator", config.numerator[0], "must not be zero throughout", 0);
+    rules.demand(any, "numerator", config.numerator[0], "must not be zero throughout", 0);
     if (!rules) return rules.error();
     plant.e = plant.b;
     return plant;
   }
 
-  /// The plant with the given matrices, after `check`.
+  /// The plant with the given matrices, after `validate`.
   static constexpr Expected<LinearPlant, Error<ScalarType>> state_space(const LinearPlant& plant) {
-    if (const auto ok = plant.check(); !ok) return ok.error();
+    if (const auto ok = plant.validate(); !ok) return ok.error();
     return plant;
   }
 
   /// An error for a number that is not finite, a negative dead time, an output that no input
   /// reaches, or an input gain that the scalar cannot hold. Its index is the element, counted by
   /// columns, or the number of the output.
-  [[nodiscard]] constexpr Check<ScalarType> check() const {
+  [[nodiscard]] constexpr Check<ScalarType> validate() const {
     Rules<ScalarType> rules;
     rules.finite("a", a).finite("b", b).finite("c", c).finite("e", e).not_negative("dead_time",
                                                                                    dead_time);
     for (int i = 0; i < Outputs && rules; ++i) {
       const Reached reached = first_gain(i);
-      rules.require(reached.degree > 0, "c", c(i, 0), "is of an output that no input reaches", i);
+      rules.demand(reached.degree > 0, "c", c(i, 0), "is of an output that no input reaches", i);
       for (const ScalarType& gain : reached.gain) {
-        rules.require(all(is_finite(gain)), "b", gain,
-                      "gives an input gain (the value here) that the scalar cannot hold");
+        rules.demand(all(is_finite(gain)), "b", gain,
+                     "gives an input gain (the value here) that the scalar cannot hold");
       }
     }
     return rules;
@@ -239,7 +239,7 @@ constexpr Expected<LinearPlant<States + More, S, Inputs, Outputs>, Error<S>> wit
     const LinearPlant<States, S, Inputs, Outputs>& plant, const S& time_constant,
     const Connect& connect) {
   Rules<S> rules;
-  rules.all_of(plant.check())
+  rules.all_of(plant.validate())
       .positive("time_constant", time_constant)
       .invertible("time_constant", time_constant);
   if (!rules) return rules.error();
@@ -252,8 +252,8 @@ constexpr Expected<LinearPlant<States + More, S, Inputs, Outputs>, Error<S>> wit
   const S rate = S(1.0) / time_constant;
   for (int j = States; j < States + More; ++j) bigger.a(j, j) = -rate;
   connect(bigger, rate);
-  rules.require(bigger.check().has_value(), "time_constant", time_constant,
-                "gives a plant that the scalar cannot hold");
+  rules.demand(bigger.validate().has_value(), "time_constant", time_constant,
+               "gives a plant that the scalar cannot hold");
   if (!rules) return rules.error();
   return bigger;
 }
@@ -291,11 +291,11 @@ template <int States, Scalar S, int Inputs, int Outputs>
 constexpr Expected<LinearPlant<States, S, Inputs, Outputs>, Error<S>> with_dead_time(
     const LinearPlant<States, S, Inputs, Outputs>& plant, const S& dead_time) {
   Rules<S> rules;
-  rules.all_of(plant.check()).not_negative("dead_time", dead_time);
+  rules.all_of(plant.validate()).not_negative("dead_time", dead_time);
   if (!rules) return rules.error();
   auto late = plant;
   late.dead_time = late.dead_time + dead_time;
-  if (const auto ok = late.check(); !ok) return ok.error();
+  if (const auto ok = late.validate(); !ok) return ok.error();
   return late;
 }
 

@@ -34,22 +34,22 @@ class MeasuredPath {
   };
 
   MeasuredPath() = default;
-  /// Settings that `check` accepts.
+  /// Settings that `validate` accepts.
   MeasuredPath(const MeasuredInput<S>& input, const S& time) noexcept : input_(input) {
     set_time(time);
   }
 
-  static Check<S> check(const MeasuredInput<S>& input, const S& time, int index) {
+  static Check<S> validate(const MeasuredInput<S>& input, const S& time, int index) {
     return Rules<S>{}
         .finite("inputs.gain", input.gain, index)
         .not_negative("inputs.lag", input.lag, index)
-        .require(input.lag <= S(1e6) * time,
-                 {"inputs.lag", input.lag, "must be at most a million samples, s:", index,
-                  S(1e6) * time, true})
+        .demand(input.lag <= S(1e6) * time,
+                {"inputs.lag", input.lag, "must be at most a million samples, s:", index,
+                 S(1e6) * time, true})
         .not_negative("inputs.dead_time", input.dead_time, index)
-        .require(input.dead_time <= longest(time), {"inputs.dead_time", input.dead_time,
-                                                    "must be at most Capacity samples, s:", index,
-                                                    static_cast<S>(Capacity) * time, true});
+        .demand(input.dead_time <= longest(time),
+                {"inputs.dead_time", input.dead_time, "must be at most Capacity samples, s:", index,
+                 static_cast<S>(Capacity) * time, true});
   }
 
   /// Other settings, the same memory.

@@ -141,11 +141,11 @@ Check<S> check_parts(const PartsSettings<Parts, S>& settings, const S& time) {
     const auto& [lowest, highest] = settings.speed;
     rules.positive("model.speed.lowest", lowest)
         .positive("model.speed.highest", highest)
-        .require(lowest <= S(1), "model.speed.lowest", lowest, "must be 1 at most")
-        .require(highest >= S(1), "model.speed.highest", highest, "must be 1 or more");
+        .demand(lowest <= S(1), "model.speed.lowest", lowest, "must be 1 at most")
+        .demand(highest >= S(1), "model.speed.highest", highest, "must be 1 or more");
     for (const auto& resonance : settings.resonators) {
-      rules.require(highest * resonance.frequency * time < S(3.1), "model.speed.highest", highest,
-                    "takes a resonator to half the sample rate");
+      rules.demand(highest * resonance.frequency * time < S(3.1), "model.speed.highest", highest,
+                   "takes a resonator to half the sample rate");
     }
   }
   check_first_order(rules, settings.first_order, time);

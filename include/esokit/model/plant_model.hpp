@@ -70,7 +70,7 @@ requires(Parts.states > 0)  //
   static Expected<AugmentedModel, Error<S>> make(const Settings& settings, const S& input_gain,
                                                  const S& sample_time) {
     const auto& plant = settings.plant;
-    if (const auto ok = plant.check(); !ok) {
+    if (const auto ok = plant.validate(); !ok) {
       Error<S> error = ok.error();
       for (const char* field : {"model.plant.a", "model.plant.b", "model.plant.c", "model.plant.e",
                                 "model.plant.dead_time"}) {
@@ -81,15 +81,15 @@ requires(Parts.states > 0)  //
     Rules<S> rules;
     const int degree = plant.relative_degree();
     rules
-        .require(degree == n, {"model.plant", static_cast<S>(degree),
-                               "has another relative degree than", -1, S(n), true})
-        .require(!(plant.dead_time > S(0)), "model.plant.dead_time", plant.dead_time,
-                 "must be 0: a delay of u is DelayedInput's")
+        .demand(degree == n, {"model.plant", static_cast<S>(degree),
+                              "has another relative degree than", -1, S(n), true})
+        .demand(!(plant.dead_time > S(0)), "model.plant.dead_time", plant.dead_time,
+                "must be 0: a delay of u is DelayedInput's")
         .all_of(detail::check_parts(settings, sample_time));
     if (!rules) return rules.error();
     const S seen = shown_share(plant, sample_time);
     constexpr S least = S(1024) * std::numeric_limits<S>::epsilon();
-    rules.require(
+    rules.demand(
         seen >= least,
         {"model.plant.c", seen, "makes a state unobservable: the share that y shows of it is below",
          -1, least, true});
@@ -97,7 +97,7 @@ requires(Parts.states > 0)  //
     const auto passes = [&](const char* field, int index, const char* rule, const S& real,
                             const S& imaginary) {
       const S passed = from_d.share(real * sample_time, imaginary * sample_time);
-      rules.require(passed >= least, {field, passed, rule, index, least, true});
+      rules.demand(passed >= least, {field, passed, rule, index, least, true});
     };
     passes("model.plant.e", -1,
            "hides a constant disturbance behind a zero: the share that y shows of it is below",
@@ -116,8 +116,8 @@ requires(Parts.states > 0)  //
     if (!rules) return rules.error();
     AugmentedModel model(settings, input_gain, sample_time);
     for (const S& x : model.step_) {
-      rules.require(is_finite(x), "model.plant", x,
-                    "gives a transition that the scalar cannot hold");
+      rules.demand(is_finite(x), "model.plant", x,
+                   "gives a transition that the scalar cannot hold");
     }
     if (!rules) return rules.error();
     return model;

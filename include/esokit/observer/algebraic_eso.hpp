@@ -38,8 +38,8 @@ class AlgebraicEso
   static constexpr int N = Order + Extension;
 
  public:
-  using Estimate = typename Base::Estimate;  ///< (y, .., y^(n-1), d, .., d^(m-1)), N x 1
-  using Status = typename Base::Status;      ///< StepStatus, for a pack one per lane
+  using Estimate = typename Base::Estimate;      ///< (y, .., y^(n-1), d, .., d^(m-1)), N x 1
+  using StatusType = typename Base::StatusType;  ///< StepStatus, for a pack one per lane
   template <class T>
   using with_scalar = AlgebraicEso<Order, T, Extension>;  ///< the same with another scalar
 
@@ -74,9 +74,9 @@ class AlgebraicEso
   };
 
   /// One sample, see PredictorCorrector::update.
-  [[gnu::flatten]] Status update(S y, S u_applied) noexcept {
+  [[gnu::__flatten__]] StatusType update(S y, S u_applied) noexcept {
     if (settled() == true && this->may_be_quick()) [[likely]] {
-      const Status status = Base::update(y, u_applied);
+      const StatusType status = Base::update(y, u_applied);
       if (status != StepStatus::ok) [[unlikely]]
         return after_trouble(status);
       return status;
@@ -85,7 +85,7 @@ class AlgebraicEso
   }
 
   /// Measurement update only, see PredictorCorrector::correct.
-  Status correct(S y) noexcept { return blank_anew(Base::correct(y)); }
+  StatusType correct(S y) noexcept { return blank_anew(Base::correct(y)); }
 
   /// Takes over the settings of `fresh`, as returned by `make`, without design work. As with
   /// `retune`, the estimate and the place in the schedule (counted in samples) are kept, and a
@@ -111,10 +111,10 @@ class AlgebraicEso
   }
 
   /// Restarts at (y, 0, .., 0).
-  Status reset(S y) noexcept { return blank_after(Base::reset(y)); }
+  StatusType reset(S y) noexcept { return blank_after(Base::reset(y)); }
 
   /// Restarts at a given estimate, N x 1.
-  Status reset(const Estimate& state) noexcept { return blank_after(Base::reset(state)); }
+  StatusType reset(const Estimate& state) noexcept { return blank_after(Base::reset(state)); }
 
   /// All published estimates in physical units, N x 1; while blanked, those from the start.
   [[nodiscard]] Estimate estimate() const noexcept {
@@ -182,7 +182,7 @@ class AlgebraicEso
 
   // Out of line, so that the settled observer costs the same as LinearEso; in one function it would
   // take 1.3 times as long.
-  [[gnu::noinline, gnu::flatten]] Status update_running(S y, S u_applied) noexcept {
+  [[gnu::__noinline__, gnu::__flatten__]] StatusType update_running(S y, S u_applied) noexcept {
     return blank_anew(Base::update(y, u_applied));
   }
 
@@ -191,9 +191,11 @@ class AlgebraicEso
     return blank_anew(Base::update_advanced(y, u_applied));
   }
 
-  ESOKIT_COLD Status after_trouble(const Status& status) noexcept { return blank_anew(status); }
+  ESOKIT_COLD StatusType after_trouble(const StatusType& status) noexcept {
+    return blank_anew(status);
+  }
 
-  Status blank_after(const Status& status) noexcept {
+  StatusType blank_after(const StatusType& status) noexcept {
     if (status == StepStatus::ok) publish(Base::estimate());
     return status;
   }
@@ -209,7 +211,7 @@ class AlgebraicEso
   }
 
   /// After a restart because of a long gap, the estimates published before are too old.
-  ESOKIT_INLINE Status blank_anew(const Status& status) noexcept {
+  ESOKIT_INLINE StatusType blank_anew(const StatusType& status) noexcept {
     if (has(status, StepStatus::restarted)) [[unlikely]]
       publish(Base::estimate());
     return status;

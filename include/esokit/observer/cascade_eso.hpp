@@ -70,8 +70,8 @@ Expected<LevelSpecs<typename Placement::template Spec<Size, S>, Levels>, Error<S
     if (!rules) return rules.error();
     S bandwidth = config.observer_bandwidth;
     for (S& spec : levels.specs) {
-      rules.require(all(is_finite(bandwidth)), "bandwidth_factor", config.bandwidth_factor,
-                    "with observer_bandwidth gives a bandwidth that the scalar cannot hold");
+      rules.demand(all(is_finite(bandwidth)), "bandwidth_factor", config.bandwidth_factor,
+                   "with observer_bandwidth gives a bandwidth that the scalar cannot hold");
       spec = bandwidth;
       bandwidth = bandwidth * config.bandwidth_factor;
     }
@@ -92,8 +92,8 @@ Expected<Array<Law, Levels>, Error<S>> level_laws(const Config& config, MakeLaw&
                               levels->indexed ? i : -1);
     if (!law) return law.error();
     if (!laws) {
-      laws = [&]<int... I>(std::integer_sequence<int, I...>) {
-        return Array<Law, Levels>{((void)I, *law)...};
+      laws = [&]<int... Index>(std::integer_sequence<int, Index...>) {
+        return Array<Law, Levels>{((void)Index, *law)...};
       }
       (std::make_integer_sequence<int, Levels>{});
     }

@@ -151,7 +151,7 @@ class ExtendedStateFilter
     }
   };
 
-  using Status = StatusOf<S>;  ///< StepStatus, for a pack one per lane
+  using StatusType = StatusOf<S>;  ///< StepStatus, for a pack one per lane
   template <class T>
   using with_scalar =
       ExtendedStateFilter<Order, T, Extension, typename detail::ForScalar<Model, T>::type,
@@ -166,7 +166,7 @@ class ExtendedStateFilter
   }
 
   /// One sample: `predict(u_applied)`, then `correct(y)`.
-  Status update(S y, S u_applied) noexcept {
+  StatusType update(S y, S u_applied) noexcept {
     if constexpr (records<S>) {
       if (!usual()) (void)y[0];  // branches on numbers
       return Base::update(y, u_applied);
@@ -179,8 +179,8 @@ class ExtendedStateFilter
 
   /// The same with the noise variance R of this measurement, unit of y squared. If it is negative
   /// or not finite, the measurement counts as missing.
-  Status update_weighted(S y, S u_applied, S measurement_variance) noexcept {
-    const Status predicted = predict(u_applied);
+  StatusType update_weighted(S y, S u_applied, S measurement_variance) noexcept {
+    const StatusType predicted = predict(u_applied);
     if (!all(is_finite(measurement_variance)) || !all(measurement_variance >= S(0.0))) {
       return predicted | StepStatus::measurement_rejected;
     }
@@ -189,7 +189,7 @@ class ExtendedStateFilter
   }
 
   /// Time update only: one sample without a measurement, or the first half of `update`.
-  Status predict(S u_applied) noexcept {
+  StatusType predict(S u_applied) noexcept {
     if constexpr (!has_model) {
       return Base::predict(u_applied);
     } else {
@@ -201,7 +201,7 @@ class ExtendedStateFilter
   }
 
   /// Measurement update only.
-  Status correct(S y) noexcept {
+  StatusType correct(S y) noexcept {
     if constexpr (records<S>) {
       if (law().any_watched()) (void)y[0];
     } else if (!accepts(y)) {
@@ -221,10 +221,10 @@ class ExtendedStateFilter
   }
 
   /// Restarts at (y, 0, .., 0) with P0.
-  Status reset(S y) noexcept { return restart_clock(Base::reset(y)); }
+  StatusType reset(S y) noexcept { return restart_clock(Base::reset(y)); }
 
   /// Restarts at a given estimate, N x 1, with P0.
-  Status reset(const Estimate& state) noexcept { return restart_clock(Base::reset(state)); }
+  StatusType reset(const Estimate& state) noexcept { return restart_clock(Base::reset(state)); }
 
   /// Bound on the covariance of the error of the present estimate, N x N, in the units of the
   /// estimates: after `predict` that of the prediction, after `correct` that of the corrected
@@ -316,14 +316,14 @@ class ExtendedStateFilter
   }
 
   // A function of its own, so that the step of a frozen filter contains only a tail call.
-  [[gnu::noinline]] StepStatus update_out_of_line(S y, S u_applied) noexcept {
+  [[gnu::__noinline__]] StepStatus update_out_of_line(S y, S u_applied) noexcept {
     if (!has_model && !gated()) [[likely]]
       return Base::update(y, u_applied);
     const StepStatus predicted = predict(u_applied);
     return predicted | correct(y);
   }
 
-  Status restart_clock(Status status) noexcept {
+  StatusType restart_clock(StatusType status) noexcept {
     for (int i = 0; i < lane_count<S>; ++i) {
       if (has_model && detail::of_lane(status, i) == StepStatus::ok)
         detail::of_lane(rest_.sample, i) = 0;

@@ -67,9 +67,9 @@ class MimoExtendedStateFilter {
         .all_of(factored(detail::noise_field(config), noise, filter.recursion_.noise));
     const OutputCovariance measured = config.measurement_covariance / filter.unit_;
     for (int i = 0; i < outputs; ++i) {
-      rules.require(!(measured(i, i) > S(0)) || detail::is_held(measured(i, i)),
-                    "measurement_covariance", config.measurement_covariance(i, i), not_held,
-                    i * outputs + i);
+      rules.demand(!(measured(i, i) > S(0)) || detail::is_held(measured(i, i)),
+                   "measurement_covariance", config.measurement_covariance(i, i), not_held,
+                   i * outputs + i);
     }
     if (!rules) return rules.error();
     const auto measurement = CovarianceFactor<outputs, S>::from_matrix(measured);
@@ -209,10 +209,10 @@ class MimoExtendedStateFilter {
   }
 
   /// Estimates of chain i, (n_i + m) x 1.
-  template <int I>
+  template <int Index>
   [[nodiscard]] auto chain_estimate() const noexcept {
-    constexpr int length = Orders::values[I] + Extension;
-    return estimate().template segment<length>(first(I));
+    constexpr int length = Orders::values[Index] + Extension;
+    return estimate().template segment<length>(first(Index));
   }
 
   /// d_1 .. d_p, unit of y_i^(n_i).

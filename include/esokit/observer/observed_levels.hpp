@@ -35,7 +35,7 @@ class ObservedLevels {
   using Estimate = typename Model::Estimate;       ///< (y, .., y^(n-1), d, .., d^(m-1)), N x 1
   using State = typename Model::State;             ///< scaled, N elements
   using Laws = Array<Law, Levels>;                 ///< one for each level
-  using Status = StatusOf<S>;                      ///< StepStatus, for a pack one per lane
+  using StatusType = StatusOf<S>;                  ///< StepStatus, for a pack one per lane
 
   /// All estimates after the last step, N x 1, in physical units: plant states of the last level,
   /// disturbance summed over all levels.

@@ -37,8 +37,8 @@ Check<S> check_chain(const ChainConfig<S>& config) {
       .representable("input_gain", config.input_gain,
                      Chain::scaled_input_gain(config.input_gain, config.sample_time),
                      "times T^n / n! gives a gain that the scalar cannot hold")
-      .require(1 <= config.max_gap && config.max_gap <= 65000, "max_gap",
-               detail::integer<S>(config.max_gap), "must be 1 .. 65000");
+      .demand(1 <= config.max_gap && config.max_gap <= 65000, "max_gap",
+              detail::integer<S>(config.max_gap), "must be 1 .. 65000");
 }
 
 }  // namespace detail
@@ -75,7 +75,7 @@ class PredictorCorrector : public ObservedLevels<Order, S, Extension, Law, Level
   using typename Base::Estimate;
   using typename Base::Laws;
   using typename Base::State;
-  using typename Base::Status;
+  using typename Base::StatusType;
 
   /// The same with another scalar.
   template <class T>
@@ -110,19 +110,19 @@ class PredictorCorrector : public ObservedLevels<Order, S, Extension, Law, Level
   /// One sample: `predict(u_applied)`, then `correct(y)`.
   /// @param y measurement at sample k
   /// @param u_applied input that the actuator held from k - 1 to k, after its limits
-  Status update(S y, S u_applied) noexcept {
+  StatusType update(S y, S u_applied) noexcept {
     numbers_.advance_laws();
     return update_advanced(y, u_applied);
   }
 
   /// Time update only: one sample without a measurement, or the first half of `update`.
-  Status predict(S u_applied) noexcept {
+  StatusType predict(S u_applied) noexcept {
     numbers_.advance_laws();
     return predict_advanced(u_applied);
   }
 
   /// Measurement update only. After a gap it uses the gain for the time since the last correction.
-  Status correct(S y) noexcept {
+  StatusType correct(S y) noexcept {
     if constexpr (records<S>) {
       (void)correct_all(y);
       return StepStatus::ok;
@@ -139,7 +139,7 @@ class PredictorCorrector : public ObservedLevels<Order, S, Extension, Law, Level
   /// Call this between `predict` and `correct` if the actuator held `u_applied` instead of the u
   /// given to `predict`. Adds Gamma (u_applied - u_given) to the prediction. A u that is not
   /// finite, or would make the prediction not finite, changes nothing and is reported.
-  Status revise_input(S u_applied) noexcept {
+  StatusType revise_input(S u_applied) noexcept {
     LevelStates next = numbers_.kept.states;
     const S more = u_applied - numbers_.kept.applied_input;
     for (auto& state : next) state = numbers_.model.add_input(state, more);
@@ -165,11 +165,11 @@ class PredictorCorrector : public ObservedLevels<Order, S, Extension, Law, Level
   }
 
   /// Restarts at (y, 0, .., 0). A y that is not finite changes nothing and is reported.
-  Status reset(S y) noexcept { return reset_scaled(Numbers::standing(y)); }
+  StatusType reset(S y) noexcept { return reset_scaled(Numbers::standing(y)); }
 
   /// Restarts at a given estimate, N x 1, physical units. A state that is not finite changes
   /// nothing and is reported.
-  Status reset(const Estimate& state) noexcept {
+  StatusType reset(const Estimate& state) noexcept {
     return reset_scaled(numbers_.model.scaled(state));
   }
 
@@ -177,7 +177,7 @@ class PredictorCorrector : public ObservedLevels<Order, S, Extension, Law, Level
   /// estimate would otherwise grow with every turn.
   /// @return ok, or state_rejected if the offset or the new estimate is not finite: nothing changes
   ///         then
-  constexpr Status shift_output(const S& offset) noexcept
+  constexpr StatusType shift_output(const S& offset) noexcept
       requires(model_traits<Model>.shifts_output) {
     constexpr auto y = static_cast<std::size_t>(Model::state_of_row(0));
     LevelStates next = numbers_.kept.states;
@@ -190,7 +190,7 @@ class PredictorCorrector : public ObservedLevels<Order, S, Extension, Law, Level
 
   /// Adds `offset` (unit of y^(n)) to dhat, for when another term takes over a part of y^(n).
   /// @return as for `shift_output`
-  constexpr Status shift_disturbance(const S& offset) noexcept {
+  constexpr StatusType shift_disturbance(const S& offset) noexcept {
     LevelStates next = numbers_.kept.states;
     Numbers::add_disturbance(next, numbers_.model.scaled_disturbance(offset));
     return shift_to(next);
@@ -198,7 +198,7 @@ class PredictorCorrector : public ObservedLevels<Order, S, Extension, Law, Level
 
   /// Adds `offset` (unit of y^(n), n of the plant) to the load on the plant, for when it is known.
   /// With an actuator in the model the load acts behind it, on y^(n). @return as for `shift_output`
-  constexpr Status shift_load(const S& offset) noexcept
+  constexpr StatusType shift_load(const S& offset) noexcept
       requires(model_traits<Model>.is_chain || model_traits<Model>.tells_constant) {
     if constexpr (model_traits<Model>.is_chain) {
       return shift_disturbance(offset);
@@ -297,7 +297,7 @@ class PredictorCorrector : public ObservedLevels<Order, S, Extension, Law, Level
   /// @endcond
 
   /// `update` after the laws have advanced, for derived observers.
-  ESOKIT_INLINE Status update_advanced(const S& y, const S& u_applied) noexcept {
+  ESOKIT_INLINE StatusType update_advanced(const S& y, const S& u_applied) noexcept {
     if (this->may_be_quick() && step(y, u_applied)) [[likely]]
       return StepStatus::ok;
     if constexpr (records<S>) {
@@ -324,7 +324,7 @@ class PredictorCorrector : public ObservedLevels<Order, S, Extension, Law, Level
   /// A gap longer than any max_gap.
   static constexpr std::uint16_t restart_due = 65535;
 
-  constexpr Status shift_to(const LevelStates& next) noexcept {
+  constexpr StatusType shift_to(const LevelStates& next) noexcept {
     return numbers_.take(next) ? StepStatus::ok : StepStatus::state_rejected;
   }
 
@@ -346,7 +346,7 @@ class PredictorCorrector : public ObservedLevels<Order, S, Extension, Law, Level
   ESOKIT_COLD LevelStates predicted_seldom(S u) const noexcept { return numbers_.predicted(u); }
   ESOKIT_COLD bool take_seldom(const LevelStates& next) noexcept { return numbers_.take(next); }
 
-  ESOKIT_COLD Status update_guarded(S y, S u_applied) noexcept {
+  ESOKIT_COLD StatusType update_guarded(S y, S u_applied) noexcept {
     const LevelStates before = numbers_.kept.states;
     const LevelStates next = predicted_seldom(u_applied);
     if (Numbers::has_squares && this->missed() == 0) {  // perhaps only the squares overflowed
@@ -366,7 +366,7 @@ class PredictorCorrector : public ObservedLevels<Order, S, Extension, Law, Level
     return predicted | correct(y);
   }
 
-  Status predict_advanced(S u_applied) noexcept {
+  StatusType predict_advanced(S u_applied) noexcept {
     if (predict_all(u_applied)) [[likely]]
       return StepStatus::ok;
     if constexpr (records<S>) {
@@ -403,7 +403,7 @@ class PredictorCorrector : public ObservedLevels<Order, S, Extension, Law, Level
     return StepStatus::input_rejected | StepStatus::prediction_dropped;
   }
 
-  Status reset_scaled(const State& state) noexcept {
+  StatusType reset_scaled(const State& state) noexcept {
     LevelStates states;
     for (auto& level : states) level = state;
     for (std::size_t i = 1; i < Levels && Numbers::adds_up; ++i) {

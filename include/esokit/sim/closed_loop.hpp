@@ -278,19 +278,19 @@ struct SampledLoop {
     const auto given = static_cast<typename Observer::scalar_type>(config.sample_time);
     Rules<ScalarType> rules;
     rules.positive("sample_time", config.sample_time)
-        .require(!(given < own || given > own), {.field = "sample_time",
-                                                 .value = config.sample_time,
-                                                 .rule = "must be that of the observer, which is",
-                                                 .limit = static_cast<ScalarType>(own),
-                                                 .has_limit = true});
+        .demand(!(given < own || given > own), {.field = "sample_time",
+                                                .value = config.sample_time,
+                                                .rule = "must be that of the observer, which is",
+                                                .limit = static_cast<ScalarType>(own),
+                                                .has_limit = true});
     if (!rules) return rules.error();
     const auto samples =
         detail::whole_multiple("duration", config.duration, config.sample_time,
                                "must be a whole multiple of sample_time, which is");
     if (!samples) return samples.error();
     rules
-        .require(config.substeps >= 1, "substeps", static_cast<ScalarType>(config.substeps),
-                 "must be 1 or more")
+        .demand(config.substeps >= 1, "substeps", static_cast<ScalarType>(config.substeps),
+                "must be 1 or more")
         .finite("start_time", config.start_time)
         .finite("initial_input", config.initial_input)
         .all_of(detail::check_state("plant_state", config.plant_state));

@@ -58,7 +58,7 @@ class ContinuousConstantGain {
   static Expected<ContinuousConstantGain, Error<S>> make(const char* field, const Spec& spec,
                                                          int index = -1) {
     Rules<S> rules;
-    rules.all_of(Placement::template check<Size, S>(field, spec, index));
+    rules.all_of(Placement::template validate<Size, S>(field, spec, index));
     if (!rules) return rules.error();
     ContinuousConstantGain law;
     law.gain_ = Placement::template gain<Size, S>(spec);

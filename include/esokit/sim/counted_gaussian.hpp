@@ -54,7 +54,7 @@ ESOKIT_INLINE Real square_root(const Real& x) noexcept {
   if constexpr (std::is_same_v<Real, double>) {
 #if defined(__SSE2__) && defined(_WIN32) && defined(__GNUC__)
     // The sqrt of MinGW's library rounds twice: one root in 4,000 is not that of a register.
-    typedef double Two __attribute__((vector_size(16)));
+    typedef double Two __attribute__((__vector_size__(16)));
     return __builtin_ia32_sqrtpd(Two{x, x})[0];
 #else
     return std::sqrt(x);
@@ -200,7 +200,7 @@ class CountedGaussian {
   static constexpr int blocks = 8;         ///< calls of the generator at a time
   static constexpr int size = 4 * blocks;  ///< numbers per lane that they give
 
-  [[gnu::noinline]] void fill() noexcept {
+  [[gnu::__noinline__]] void fill() noexcept {
     if constexpr (lane_count<S> == 1) {
       fill_lanes<std::uint64_t, double>(
           run_, [](S& number, double value) { number = static_cast<S>(value); });

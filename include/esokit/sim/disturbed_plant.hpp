@@ -47,10 +47,10 @@ class DisturbedPlant {
     Disturbance disturbance{};  ///< d(t)
   };
 
-  /// Returns the errors of the plant's `check`, and refuses a dead time.
+  /// Returns the errors of the plant's `validate`, and refuses a dead time.
   static Expected<DisturbedPlant, Error<ScalarType>> make(Config config) {
     Rules<ScalarType> rules;
-    rules.all_of(config.plant.check())
+    rules.all_of(config.plant.validate())
         .left_out("plant.dead_time", config.plant.dead_time,
                   "must be zero in a continuous simulation");
     if (!rules) return rules.error();

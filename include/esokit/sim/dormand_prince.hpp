@@ -64,8 +64,8 @@ class VariableStep {
   static Expected<VariableStep, Error<ScalarType>> make(const Config& config) {
     Rules<ScalarType> rules;
     rules.positive("relative_tolerance", config.relative_tolerance)
-        .require(config.relative_tolerance < ScalarType{1}, "relative_tolerance",
-                 config.relative_tolerance, "must be below 1")
+        .demand(config.relative_tolerance < ScalarType{1}, "relative_tolerance",
+                config.relative_tolerance, "must be below 1")
         .positive("absolute_tolerance", config.absolute_tolerance);
     if (!rules) return rules.error();
     return VariableStep(config);
@@ -109,13 +109,13 @@ class VariableStep {
       const bool finite = is_finite(result.sum()) && is_finite(difference.sum());
       if (finite && q <= ScalarType{1}) {
         const ScalarType proposed =
-            refused ? h : h * std::min(ScalarType{5}, fraction(0.8) / fifth_root(q));
-        next_ = cut && !refused ? std::max(next_, proposed) : proposed;
+            refused ? h : h * (std::min)(ScalarType{5}, fraction(0.8) / fifth_root(q));
+        next_ = cut && !refused ? (std::max)(next_, proposed) : proposed;
         x = result;
         return cut ? end : t + h;
       }
       const ScalarType shorter = finite ? fraction(0.8) / fifth_root(q) : ScalarType{};
-      h *= refused ? fraction(0.5) : std::max(fraction(0.1), shorter);
+      h *= refused ? fraction(0.5) : (std::max)(fraction(0.1), shorter);
     }
   }
 

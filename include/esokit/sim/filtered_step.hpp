@@ -77,8 +77,8 @@ class FilteredStep {
   /// Limited to a range beyond which all densities are zero, so that 0 times infinity cannot occur.
   ScalarType scaled_time(ScalarType t) const noexcept {
     const ScalarType x = (t - config_.time) / config_.time_constant;
-    const ScalarType far{20000};
-    return x < far ? x : far;
+    const ScalarType most{20000};
+    return x < most ? x : most;
   }
 
   static Densities densities(ScalarType x) noexcept {

@@ -45,14 +45,14 @@ struct HeldPlant {
 /// The plant over `duration` with u and d held. u is the input as it arrives: the dead time is not
 /// included.
 /// @param duration s, zero or more
-/// @return error for a plant that `check` refuses and for a result that the scalar cannot hold
+/// @return error for a plant that `validate` refuses and for a result that the scalar cannot hold
 template <int States, Scalar S, int Inputs, int Outputs>
 requires PlainScalar<LaneScalar<S>>
 constexpr Expected<HeldPlant<States, S, Inputs>, Error<S>> held_plant(
     const LinearPlant<States, S, Inputs, Outputs>& plant, const S& duration) {
   using Lane = LaneScalar<S>;
   Rules<S> rules;
-  rules.all_of(plant.check()).not_negative("duration", duration);
+  rules.all_of(plant.validate()).not_negative("duration", duration);
   if (!rules) return rules.error();
   constexpr int size = States + 2 * Inputs;
   HeldPlant<States, S, Inputs> held;
@@ -87,8 +87,8 @@ constexpr Expected<HeldPlant<States, S, Inputs>, Error<S>> held_plant(
     }
     return true;
   };
-  rules.require(fits(held.increment) && fits(held.input) && fits(held.disturbance), "duration",
-                duration, "is so long that the plant's states leave the range of the scalar");
+  rules.demand(fits(held.increment) && fits(held.input) && fits(held.disturbance), "duration",
+               duration, "is so long that the plant's states leave the range of the scalar");
   if (!rules) return rules.error();
   return held;
 }

@@ -20,13 +20,13 @@ Expected<std::int64_t, Error<ScalarType>> whole_multiple(
     ScalarType precision = std::numeric_limits<ScalarType>::epsilon()) {
   if (Rules<ScalarType> rules; !rules.positive(field, value)) return rules.error();
   const ScalarType ratio = value / part;
-  const ScalarType whole = std::round(ratio);
+  const ScalarType whole = (std::round)(ratio);
   const ScalarType decimal = static_cast<ScalarType>(1e-9);
   const ScalarType rounding = precision * ScalarType{16};
   const ScalarType tolerance = decimal > rounding ? decimal : rounding;
   const ScalarType most = static_cast<ScalarType>(std::int64_t{1} << 40u);
   if (!is_finite(ratio) || !(whole >= ScalarType{1} && whole <= most) ||
-      !(std::abs(ratio - whole) <= tolerance * whole)) {
+      !((std::abs)(ratio - whole) <= tolerance * whole)) {
     return Error<ScalarType>{
         .field = field, .value = value, .rule = rule, .limit = part, .has_limit = true};
   }

@@ -36,7 +36,7 @@ ScalarType integral(const Series<ScalarType>& series, const Window<ScalarType>& 
 /// Integral of abs(e) (IAE).
 template <PlainScalar ScalarType>
 ScalarType integral_abs(const Series<ScalarType>& series, const Window<ScalarType>& window = {}) {
-  return accumulate(series, window, [](ScalarType, ScalarType e) { return std::abs(e); }).value();
+  return accumulate(series, window, [](ScalarType, ScalarType e) { return (std::abs)(e); }).value();
 }
 
 /// Integral of e^2 (ISE).
@@ -51,7 +51,7 @@ template <PlainScalar ScalarType>
 ScalarType integral_time_abs(const Series<ScalarType>& series,
                              const Window<ScalarType>& window = {}, ScalarType origin = {}) {
   return accumulate(series, window,
-                    [origin](ScalarType t, ScalarType e) { return (t - origin) * std::abs(e); })
+                    [origin](ScalarType t, ScalarType e) { return (t - origin) * (std::abs)(e); })
       .value();
 }
 

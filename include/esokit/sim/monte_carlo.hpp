@@ -273,7 +273,7 @@ class MonteCarlo {
       const StudyRecords& records, const Measure<Reduce, F>&... measures) const {
     const auto own = identity<Lanes>(measures...);
     if (!own) return own.error();
-    if (const auto ok = own->check(records.identity()); !ok) {
+    if (const auto ok = own->validate(records.identity()); !ok) {
       return detail::as_error<Time>(ok.error());
     }
     const auto missing = records.missing();
@@ -330,16 +330,16 @@ class MonteCarlo {
       const std::int64_t block = blocks[i / batches_of_a_block()];
       const std::int64_t from = static_cast<std::int64_t>(i % batches_of_a_block()) * batch;
       const std::int64_t runs = runs_of_block(block, study.config_.runs);
-      return {block * runs_in_block(study.config_.runs) + from, std::min(batch, runs - from), block,
-              from + batch >= runs};
+      return {block * runs_in_block(study.config_.runs) + from, (std::min)(batch, runs - from),
+              block, from + batch >= runs};
     }
 
     template <class Compute>
     void go(const Compute& compute) {
       const auto cores = static_cast<int>(std::thread::hardware_concurrency());
-      const int wanted = study.config_.threads > 0 ? study.config_.threads : std::max(cores, 1);
+      const int wanted = study.config_.threads > 0 ? study.config_.threads : (std::max)(cores, 1);
       outcome.threads = static_cast<int>(
-          std::min(static_cast<std::size_t>(wanted), std::max<std::size_t>(batches, 1)));
+          (std::min)(static_cast<std::size_t>(wanted), std::max<std::size_t>(batches, 1)));
       const auto work = [&] { take_batches(compute); };
       std::vector<std::thread> others;
       for (int i = 1; i < outcome.threads; ++i) others.emplace_back(work);
@@ -435,8 +435,8 @@ class MonteCarlo {
 
   /// Whether records may be those of a part of this study; they may be empty.
   static Check<Time> fits(const StudyIdentity& own, const StudyRecords& records, const Part& part) {
-    auto ok = part.check();
-    if (ok && records.identity().runs != 0) ok = own.check(records.identity());
+    auto ok = part.validate();
+    if (ok && records.identity().runs != 0) ok = own.validate(records.identity());
     if (!ok) return detail::as_error<Time>(ok.error());
     return {};
   }
@@ -455,11 +455,11 @@ class MonteCarlo {
   template <int Lanes, class... Reduce, class... F>
   Check<Time> compute(Work& work, const Measure<Reduce, F>&... measures) const {
     Rules<Time> rules;
-    rules.require(config_.runs >= 1, "runs", static_cast<Time>(config_.runs), "must be 1 or more")
-        .require(config_.threads >= 0 && config_.threads <= 4096, "threads",
-                 static_cast<Time>(config_.threads), "must be 0 .. 4096")
-        .require(!config_.loop.number, "loop.number",
-                 static_cast<Time>(config_.loop.number.value_or(0)), "must be left out");
+    rules.demand(config_.runs >= 1, "runs", static_cast<Time>(config_.runs), "must be 1 or more")
+        .demand(config_.threads >= 0 && config_.threads <= 4096, "threads",
+                static_cast<Time>(config_.threads), "must be 0 .. 4096")
+        .demand(!config_.loop.number, "loop.number",
+                static_cast<Time>(config_.loop.number.value_or(0)), "must be left out");
     if (!rules) return rules.error();
     // Checks the settings by a run that ends at once, and counts its samples.
     const auto first =
@@ -468,7 +468,7 @@ class MonteCarlo {
     const auto sample_time = detail::run_sample_time<P, C>(controller_, config_.loop);
     const double end = static_cast<double>(config_.loop.start_time + config_.loop.duration -
                                            *sample_time / Time(2));
-    (check(rules, measures, end), ...);
+    (validate(rules, measures, end), ...);
     if (!rules) return rules.error();
 
     constexpr bool possible = detail::runs_in_packs<P, C, Lanes>;
@@ -493,18 +493,18 @@ class MonteCarlo {
   }
 
   template <class Reduce, class F>
-  static void check(Rules<Time>& rules, const Measure<Reduce, F>& measure, double end) {
+  static void validate(Rules<Time>& rules, const Measure<Reduce, F>& measure, double end) {
     const MeasureOptions& options = measure.options;
     const auto from = static_cast<Time>(options.from);
     if constexpr (std::is_same_v<Reduce, detail::SettlingTime>) {
       rules.not_negative("measure.band", static_cast<Time>(measure.reduce.band));
     }
     rules
-        .require(options.from < end, "measure.from", from,
-                 "must be before the last sample of the loop")
-        .require(options.to >= options.from, "measure.to", static_cast<Time>(options.to),
-                 "must not be before measure.from")
-        .require(
+        .demand(options.from < end, "measure.from", from,
+                "must be before the last sample of the loop")
+        .demand(options.to >= options.from, "measure.to", static_cast<Time>(options.to),
+                "must not be before measure.from")
+        .demand(
             is_finite(options.limit) || std::bit_cast<std::uint64_t>(options.limit) ==
                                             std::bit_cast<std::uint64_t>(MeasureOptions{}.limit),
             "measure.limit", static_cast<Time>(options.limit), "must be finite, or left out");
@@ -559,7 +559,7 @@ class MonteCarlo {
                    .has_value();
       }
       // Repeated one by one to find out which of them failed.
-      for (std::int64_t i = at; !good && i < std::min(at + lanes, results.count); ++i) {
+      for (std::int64_t i = at; !good && i < (std::min)(at + lanes, results.count); ++i) {
         run_one(from + i, results, i, measures...);
       }
     }

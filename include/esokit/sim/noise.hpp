@@ -115,14 +115,14 @@ class HeldNoise {
     if (!noise) return noise.error();
     if (Rules<ScalarType> rules; !rules.positive("step", config.step)) return rules.error();
     const ScalarType ratio = config.hold / config.step;
-    const ScalarType whole = std::round(ratio);
+    const ScalarType whole = (std::round)(ratio);
     // Both numbers are rounded decimals: 0.01/0.001 is not 10 in every format.
     const ScalarType epsilon = std::numeric_limits<ScalarType>::epsilon() * ScalarType{16};
     const ScalarType decimal = static_cast<ScalarType>(1e-9);
     const ScalarType tolerance = epsilon > decimal ? epsilon : decimal;
     const ScalarType most = static_cast<ScalarType>(std::int64_t{1} << 31u);
     if (!(whole >= ScalarType{1} && whole <= most &&
-          std::abs(ratio - whole) <= tolerance * whole)) {
+          (std::abs)(ratio - whole) <= tolerance * whole)) {
       return Error<ScalarType>{.field = "hold",
                                .value = config.hold,
                                .rule = "must be a whole multiple (1 to 2^31) of the step",

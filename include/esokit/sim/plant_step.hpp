@@ -31,7 +31,7 @@ struct Stretch {
 /// Stretches of up to this length are rounding errors and are dropped.
 template <class Time>
 Time rounding_of(const Time& sample_time) {
-  return sample_time * std::max(Time(1e-9), 16 * std::numeric_limits<Time>::epsilon());
+  return sample_time * (std::max)(Time(1e-9), 16 * std::numeric_limits<Time>::epsilon());
 }
 
 /// Divides a sample of length `whole` into stretches: at the integration steps, and where another
@@ -109,9 +109,9 @@ Expected<typename RunTypes<P, C>::Time, Error<typename RunTypes<P, C>::Time>> ru
     for (int i = 0; i < lane_count<Own>; ++i) {
       const OwnTime in_lane = esokit::detail::number_of_lane(own, i);
       const auto asked = static_cast<OwnTime>(given);
-      rules.require(!(asked < in_lane || asked > in_lane),
-                    {"sample_time", given, "must be that of the controller, which is", -1,
-                     static_cast<Time>(in_lane), true});
+      rules.demand(!(asked < in_lane || asked > in_lane),
+                   {"sample_time", given, "must be that of the controller, which is", -1,
+                    static_cast<Time>(in_lane), true});
     }
   }
   rules.positive("sample_time", given);

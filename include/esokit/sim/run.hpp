@@ -226,7 +226,7 @@ class Run {
 
   /// @tparam Even all samples are equally long @tparam Direct each is one stretch under its own u
   template <bool Even, bool Direct, class Callback>
-  [[gnu::noinline]] Outcome drive(C controller, Callback& on_sample) {
+  [[gnu::__noinline__]] Outcome drive(C controller, Callback& on_sample) {
     constexpr bool channels = Types::references > 1 && !Types::derivatives;
     // Local copies of everything that is used in every sample, so that the compiler knows that
     // nothing changes it.
@@ -368,8 +368,9 @@ requires ControllerOf<C, P> Expected<RunEnd<P, C>, Error<typename RunTypes<P, C>
   const auto sample_time = detail::run_sample_time<P, C>(controller, config);
   if (!sample_time) return sample_time.error();
   const Time T = *sample_time;
-  const auto coarser = std::max(static_cast<Time>(std::numeric_limits<LaneScalar<Own>>::epsilon()),
-                                std::numeric_limits<Time>::epsilon());
+  const auto coarser =
+      (std::max)(static_cast<Time>(std::numeric_limits<LaneScalar<Own>>::epsilon()),
+                 std::numeric_limits<Time>::epsilon());
   const auto samples = detail::whole_multiple(
       "duration", config.duration, T, "must be a whole multiple of sample_time, which is", coarser);
   if (!samples) return samples.error();
@@ -390,34 +391,34 @@ requires ControllerOf<C, P> Expected<RunEnd<P, C>, Error<typename RunTypes<P, C>
   if (config.disturbance.constant()) numbers_of("disturbance", config.disturbance(Time(0)), finite);
   numbers_of("noise", config.noise, not_negative);
   rules.not_negative("missing", config.missing)
-      .require(!(config.missing > Time(1)), "missing", config.missing, "must not be above 1")
+      .demand(!(config.missing > Time(1)), "missing", config.missing, "must not be above 1")
       .not_negative("jitter", config.jitter)
-      .require(!(config.jitter > Time(0.9)), "jitter", config.jitter, "must not be above 0.9")
-      .require(lane_count<S> == 1 || !config.number || !(config.jitter > Time(0)), "jitter",
-               config.jitter, "must be left out if packs run by number")
+      .demand(!(config.jitter > Time(0.9)), "jitter", config.jitter, "must not be above 0.9")
+      .demand(lane_count<S> == 1 || !config.number || !(config.jitter > Time(0)), "jitter",
+              config.jitter, "must be left out if packs run by number")
       .not_negative("dead_time", config.dead_time)
-      .require(config.substeps >= 1 && config.substeps <= 1000000, "substeps",
-               static_cast<Time>(config.substeps), "must be 1 .. 1000000")
+      .demand(config.substeps >= 1 && config.substeps <= 1000000, "substeps",
+              static_cast<Time>(config.substeps), "must be 1 .. 1000000")
       .finite("start_time", config.start_time);
   numbers_of("initial_input", config.initial_input, finite);
   numbers_of("state", config.state, finite);
   Time dead_time = config.dead_time;
   if constexpr (detail::is_linear_plant<P>) {
-    if (const auto ok = plant.check(); rules && !ok) {
+    if (const auto ok = plant.validate(); rules && !ok) {
       return detail::as_error<Time>(ok.error());
     }
     const Time first = esokit::detail::number_of_lane(plant.dead_time, 0);
     for (int i = 1; i < lane_count<S>; ++i) {
       const Time other = esokit::detail::number_of_lane(plant.dead_time, i);
-      rules.require(!(other < first || other > first), "dead_time", other,
-                    "must be the same in all lanes");
+      rules.demand(!(other < first || other > first), "dead_time", other,
+                   "must be the same in all lanes");
     }
     dead_time += first;
   }
   const bool even = !(config.jitter > Time(0)) && !config.step_time;
   const Time shortest = even ? T : T / Time(10);
-  rules.require(dead_time / shortest < Time(1e6), "dead_time", dead_time,
-                "must be below 1e6 samples (1e5 with jitter)");
+  rules.demand(dead_time / shortest < Time(1e6), "dead_time", dead_time,
+               "must be below 1e6 samples (1e5 with jitter)");
   if (!rules) return rules.error();
 
   detail::Run<P, C> driven(plant, config, T, dead_time, *samples);

@@ -76,12 +76,12 @@ constexpr long double weight_of() {
 /// sum + h (w_J first + w_{J+1} rest..), without zero weights. The sum is passed on unevaluated, so
 /// that Eigen evaluates it in one pass.
 template <class Method, int Stage, int J, class State, class ScalarType, class Sum>
-[[gnu::always_inline]] inline State advanced(ScalarType /*h*/, const Sum& sum) {
+[[gnu::__always_inline__]] inline State advanced(ScalarType /*h*/, const Sum& sum) {
   return sum;
 }
 template <class Method, int Stage, int J, class State, class ScalarType, class Sum, class... Rest>
-[[gnu::always_inline]] inline State advanced(ScalarType h, const Sum& sum, const State& first,
-                                             const Rest&... rest) {
+[[gnu::__always_inline__]] inline State advanced(ScalarType h, const Sum& sum, const State& first,
+                                                 const Rest&... rest) {
   constexpr long double weight = weight_of<Method, Stage, J>();
   if constexpr (weight == 0) {
     return advanced<Method, Stage, J + 1, State>(h, sum, rest...);
@@ -93,8 +93,8 @@ template <class Method, int Stage, int J, class State, class ScalarType, class S
 
 /// Evaluates the stages from number sizeof...(k) on, and sums them.
 template <class Method, class Rhs, class State, class ScalarType, class... Stages>
-[[gnu::always_inline]] inline State finish_step(Rhs& rhs, ScalarType t, const State& x,
-                                                ScalarType h, const Stages&... k) {
+[[gnu::__always_inline__]] inline State finish_step(Rhs& rhs, ScalarType t, const State& x,
+                                                    ScalarType h, const Stages&... k) {
   constexpr int stage = sizeof...(k);
   if constexpr (stage == Method::stages) {
     return advanced<Method, stage, 0, State>(h, x, k...);

@@ -31,19 +31,19 @@ class Series {
   static Expected<Series, Error<ScalarType>> make(const Config& config) {
     const std::size_t size = config.times.size();
     Rules<ScalarType> rules;
-    rules.require(size == config.values.size(),
-                  {.field = "times",
-                   .value = static_cast<ScalarType>(size),
-                   .rule = "must have as many elements as values, which has",
-                   .limit = static_cast<ScalarType>(config.values.size()),
-                   .has_limit = true});
+    rules.demand(size == config.values.size(),
+                 {.field = "times",
+                  .value = static_cast<ScalarType>(size),
+                  .rule = "must have as many elements as values, which has",
+                  .limit = static_cast<ScalarType>(config.values.size()),
+                  .has_limit = true});
     for (std::size_t i = 0; rules && i < size; ++i) {
       const int index = static_cast<int>(i);
       const ScalarType time = config.times[i];
       rules.finite("times", time, index)
           .finite("values", config.values[i], index)
-          .require(i == 0 || !(time < config.times[i - 1]), "times", time, "must not descend",
-                   index);
+          .demand(i == 0 || !(time < config.times[i - 1]), "times", time, "must not descend",
+                  index);
     }
     if (!rules) return rules.error();
     Series series;

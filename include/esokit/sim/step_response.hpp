@@ -35,7 +35,7 @@ class StepResponse {
         .finite("final_value", config.final_value)
         .and_then([&] {
           const ScalarType height = config.final_value - config.initial_value;
-          return Rules<ScalarType>{}.require(
+          return Rules<ScalarType>{}.demand(
               is_finite(height) && height != ScalarType{},
               {.field = "final_value",
                .value = config.final_value,
@@ -47,12 +47,12 @@ class StepResponse {
         .positive("band", config.band)
         .finite("rise_from", config.rise_from)
         .finite("rise_to", config.rise_to)
-        .require(config.rise_to > config.rise_from,
-                 {.field = "rise_to",
-                  .value = config.rise_to,
-                  .rule = "must be greater than rise_from, which is",
-                  .limit = config.rise_from,
-                  .has_limit = true});
+        .demand(config.rise_to > config.rise_from,
+                {.field = "rise_to",
+                 .value = config.rise_to,
+                 .rule = "must be greater than rise_from, which is",
+                 .limit = config.rise_from,
+                 .has_limit = true});
     if (!rules) return rules.error();
     return StepResponse(config);
   }

@@ -42,17 +42,17 @@ struct Part {
     if (!slash || second.ec != std::errc{} || second.ptr != end) {
       return Error<double>{"part", 0.0, "must be two whole numbers, as in 3/8"};
     }
-    if (const auto ok = part.check(); !ok) return ok.error();
+    if (const auto ok = part.validate(); !ok) return ok.error();
     return part;
   }
 
   /// Whether there is such a part.
-  [[nodiscard]] Check<double> check() const {
+  [[nodiscard]] Check<double> validate() const {
     return Rules<double>{}
-        .require(1 <= count && count <= 1'000'000, "part.count", static_cast<double>(count),
-                 "must be 1 .. 1000000")
-        .require(0 <= index && index < count, "part.index", static_cast<double>(index),
-                 "must be 0 .. count - 1");
+        .demand(1 <= count && count <= 1'000'000, "part.count", static_cast<double>(count),
+                "must be 1 .. 1000000")
+        .demand(0 <= index && index < count, "part.index", static_cast<double>(index),
+                "must be 0 .. count - 1");
   }
 };
 
@@ -72,7 +72,7 @@ struct Part {
 /// Number of runs of block 0, 1, ..: the last one may be short.
 [[nodiscard]] constexpr std::int64_t runs_of_block(std::int64_t block, std::int64_t runs) noexcept {
   const std::int64_t size = runs_in_block(runs);
-  return std::min(size, runs - block * size);
+  return (std::min)(size, runs - block * size);
 }
 
 namespace detail {
@@ -107,8 +107,8 @@ class Hash {
     volatile double hidden = 0.37 * i - 9.0;  // so that the compiler does not compute them
     const double x = hidden;
     for (const double y :
-         {std::exp(x), std::sin(10.0 * x), std::cos(x), std::tanh(x), std::log(std::abs(x) + 0.1),
-          std::pow(std::abs(x) + 0.1, 0.3 * x), std::atan2(x, 1.7)}) {
+         {std::exp(x), std::sin(10.0 * x), std::cos(x), std::tanh(x), std::log((std::abs)(x) + 0.1),
+          std::pow((std::abs)(x) + 0.1, 0.3 * x), std::atan2(x, 1.7)}) {
       hash.add(y);
     }
     volatile double product = -x * x;
@@ -127,17 +127,17 @@ struct StudyIdentity {
 
   /// Whether records of `other` may be joined to those of this study, else an error that says what
   /// differs.
-  [[nodiscard]] Check<double> check(const StudyIdentity& other) const {
+  [[nodiscard]] Check<double> validate(const StudyIdentity& other) const {
     return Rules<double>{}
-        .require(runs == other.runs, {"records.runs", static_cast<double>(other.runs),
-                                      "must be the number of runs of the study, which is", -1,
-                                      static_cast<double>(runs), true})
-        .require(names == other.names && limits == other.limits, "records.measures",
-                 static_cast<double>(other.names.size()), "must be those of the study")
-        .require(machine == other.machine, "records.machine", static_cast<double>(other.machine),
-                 "is of another kind: its exp, sin or pow, or its sums of products, differ")
-        .require(study == other.study, "records.study", static_cast<double>(other.study),
-                 "is another one: other program, plant, controller, settings or seed");
+        .demand(runs == other.runs, {"records.runs", static_cast<double>(other.runs),
+                                     "must be the number of runs of the study, which is", -1,
+                                     static_cast<double>(runs), true})
+        .demand(names == other.names && limits == other.limits, "records.measures",
+                static_cast<double>(other.names.size()), "must be those of the study")
+        .demand(machine == other.machine, "records.machine", static_cast<double>(other.machine),
+                "is of another kind: its exp, sin or pow, or its sums of products, differ")
+        .demand(study == other.study, "records.study", static_cast<double>(other.study),
+                "is another one: other program, plant, controller, settings or seed");
   }
 };
 
@@ -174,16 +174,16 @@ class StudyRecords {
   /// @return an error if it is there with other results, if its block does not exist, or if it does
   ///         not have a result of each Measure for each run of the block that did not fail
   Check<double> add(BlockRecord record) {
-    if (const auto ok = check(record); !ok) return ok.error();
+    if (const auto ok = validate(record); !ok) return ok.error();
     blocks_.emplace(record.block, std::move(record));
     return {};
   }
 
   /// Adds the records of another part of the same study; an error changes nothing.
   Check<double> add(const StudyRecords& other) {
-    if (const auto ok = identity_.check(other.identity_); !ok) return ok.error();
+    if (const auto ok = identity_.validate(other.identity_); !ok) return ok.error();
     for (const auto& [block, record] : other.blocks_) {
-      if (const auto ok = check(record); !ok) return ok.error();
+      if (const auto ok = validate(record); !ok) return ok.error();
     }
     for (const auto& [block, record] : other.blocks_) blocks_.emplace(block, record);
     damaged_ += other.damaged_;
@@ -192,7 +192,7 @@ class StudyRecords {
 
   /// The blocks of a part for which there is no record, or the error of the part.
   [[nodiscard]] Expected<std::vector<std::int64_t>, Error<double>> missing(const Part& part) const {
-    if (const auto ok = part.check(); !ok) return ok.error();
+    if (const auto ok = part.validate(); !ok) return ok.error();
     std::vector<std::int64_t> none;
     const std::int64_t all = block_count(identity_.runs);
     for (std::int64_t i = all * part.index / part.count; i < all * (part.index + 1) / part.count;
@@ -303,7 +303,7 @@ class StudyRecords {
 
  private:
   /// Whether a record may be added.
-  [[nodiscard]] Check<double> check(const BlockRecord& record) const {
+  [[nodiscard]] Check<double> validate(const BlockRecord& record) const {
     const auto there = blocks_.find(record.block);
     bool fits = record.numbers.size() == identity_.names.size();
     for (std::size_t k = 0; fits && k < record.numbers.size(); ++k) {
@@ -313,12 +313,12 @@ class StudyRecords {
                  runs_of_block(record.block, identity_.runs);
     }
     return Rules<double>{}
-        .require(0 <= record.block && record.block < block_count(identity_.runs), "records.block",
-                 static_cast<double>(record.block), "must be one of the study")
-        .require(fits, "records.block", static_cast<double>(record.block),
-                 "must have a result of each measure for each run")
-        .require(there == blocks_.end() || there->second == record, "records.block",
-                 static_cast<double>(record.block), "is there twice, and differs");
+        .demand(0 <= record.block && record.block < block_count(identity_.runs), "records.block",
+                static_cast<double>(record.block), "must be one of the study")
+        .demand(fits, "records.block", static_cast<double>(record.block),
+                "must have a result of each measure for each run")
+        .demand(there == blocks_.end() || there->second == record, "records.block",
+                static_cast<double>(record.block), "is there twice, and differs");
   }
 
   static std::string hex(std::uint64_t word) {
@@ -334,16 +334,16 @@ class StudyRecords {
 
   /// Takes the next word of a line.
   /// @{
-  static std::string_view word(std::string_view& line) {
-    const std::size_t from = std::min(line.find_first_not_of(' '), line.size());
-    const std::size_t to = std::min(line.find(' ', from), line.size());
+  static std::string_view next_word(std::string_view& line) {
+    const std::size_t from = (std::min)(line.find_first_not_of(' '), line.size());
+    const std::size_t to = (std::min)(line.find(' ', from), line.size());
     const std::string_view found = line.substr(from, to - from);
     line.remove_prefix(to);
     return found;
   }
   template <class Whole>
   static bool take(std::string_view& line, Whole& number, int base = 10) {
-    const std::string_view text = word(line);
+    const std::string_view text = next_word(line);
     const auto end = std::from_chars(text.data(), text.data() + text.size(), number, base);
     return !text.empty() && end.ec == std::errc{} && end.ptr == text.data() + text.size();
   }
@@ -359,16 +359,17 @@ class StudyRecords {
     if (!std::getline(in, line) || in.eof()) return false;  // without its end it is cut off
     std::string_view rest(line);
     std::size_t measures = 0;
-    if (word(rest) != "esokit-runs" || word(rest) != "1" || !take(rest, identity_.study, 16) ||
-        !take(rest, identity_.machine, 16) || !take(rest, identity_.runs) ||
-        !take(rest, measures) || identity_.runs < 1 || measures > 10'000) {
+    if (next_word(rest) != "esokit-runs" || next_word(rest) != "1" ||
+        !take(rest, identity_.study, 16) || !take(rest, identity_.machine, 16) ||
+        !take(rest, identity_.runs) || !take(rest, measures) || identity_.runs < 1 ||
+        measures > 10'000) {
       return false;
     }
     for (std::size_t k = 0; k < measures; ++k) {
       double limit = 0.0;
       if (!std::getline(in, line) || in.eof()) return false;
       rest = line;
-      if (word(rest) != "measure" || !take(rest, limit)) return false;
+      if (next_word(rest) != "measure" || !take(rest, limit)) return false;
       if (!rest.empty()) rest.remove_prefix(1);
       identity_.names.emplace_back(rest);
       identity_.limits.push_back(limit);
@@ -377,7 +378,7 @@ class StudyRecords {
   }
   static bool read_block(std::string_view line, BlockRecord& record) {
     std::size_t failed = 0;
-    word(line);
+    next_word(line);
     if (!take(line, record.block) || !take(line, failed)) return false;
     for (std::size_t i = 0; i < failed; ++i) {
       std::int64_t run = 0;
@@ -388,7 +389,7 @@ class StudyRecords {
   }
   static bool read_sums(std::string_view line, RunStatistics& number) {
     RunSums s;
-    if (word(line) != "sums" || !take(line, s.count) || !take(line, s.kept) ||
+    if (next_word(line) != "sums" || !take(line, s.count) || !take(line, s.kept) ||
         !take(line, s.mean) || !take(line, s.squares) || !take(line, s.smallest) ||
         !take(line, s.largest) || !take(line, s.run_of_smallest) || !take(line, s.run_of_largest)) {
       return false;
@@ -397,9 +398,9 @@ class StudyRecords {
     return true;
   }
   static bool read_bins(std::string_view line, RunStatistics& number) {
-    if (word(line) != "bins") return false;
+    if (next_word(line) != "bins") return false;
     std::uint64_t bin = 0;
-    for (std::string_view one = word(line); !one.empty(); one = word(line)) {
+    for (std::string_view one = next_word(line); !one.empty(); one = next_word(line)) {
       std::uint64_t step = 0, count = 1;
       auto end = std::from_chars(one.data(), one.data() + one.size(), step);
       if (end.ec == std::errc{} && end.ptr != one.data() + one.size() && *end.ptr == '*') {

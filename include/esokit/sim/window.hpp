@@ -15,7 +15,7 @@ class Window {
   /// Settings of make.
   struct Config {
     ScalarType start = std::numeric_limits<ScalarType>::lowest();  ///< s
-    ScalarType end = std::numeric_limits<ScalarType>::max();       ///< s, after `start`
+    ScalarType end = (std::numeric_limits<ScalarType>::max)();     ///< s, after `start`
   };
 
   /// All time.
@@ -26,11 +26,11 @@ class Window {
     Rules<ScalarType> rules;
     rules.finite("start", config.start)
         .finite("end", config.end)
-        .require(config.end > config.start, {.field = "end",
-                                             .value = config.end,
-                                             .rule = "must be greater than start, which is",
-                                             .limit = config.start,
-                                             .has_limit = true});
+        .demand(config.end > config.start, {.field = "end",
+                                            .value = config.end,
+                                            .rule = "must be greater than start, which is",
+                                            .limit = config.start,
+                                            .has_limit = true});
     if (!rules) return rules.error();
     return Window(config);
   }

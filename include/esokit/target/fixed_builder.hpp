@@ -170,7 +170,7 @@ class FixedBuilder : public FixedRecord {
       if (!known) scales.push_back(s);
       list->setting = varies ? static_cast<int>(products) : -1;
       ++products;
-      const auto rounded = static_cast<std::int32_t>(std::lround(std::min(gain(s), largest)));
+      const auto rounded = static_cast<std::int32_t>(std::lround((std::min)(gain(s), largest)));
       const Value result =
           high ? list->times_high(v, rounded, s, of->rounds_) : list->times(v, rounded, s);
       list->setting = -1;
@@ -190,8 +190,9 @@ class FixedBuilder : public FixedRecord {
         shifted.scale -= exponent;
         for (double& x : shifted.form) x = std::ldexp(x, exponent);
         if (odd == 1) return shifted;
-        const Value near = list->to_scale(shifted, std::min(shifted.scale, scale + 2), of->rounds_);
-        return list->times(near, odd, near.scale);
+        const Value fitting =
+            list->to_scale(shifted, (std::min)(shifted.scale, scale + 2), of->rounds_);
+        return list->times(fitting, odd, fitting.scale);
       }
       return product(c, v, given == nullptr ? 0 : given->second, scale, full, one.varies, negative);
     }
@@ -220,9 +221,9 @@ class FixedBuilder : public FixedRecord {
       if (!fine.empty()) {
         const int owner = list->owner;
         int common = fine[0].first.scale;
-        for (const auto& part : fine) common = std::min(common, part.first.scale);
+        for (const auto& part : fine) common = (std::min)(common, part.first.scale);
         list->owner = owner + fine_parts;
-        common = std::max(scale, common - of->coarser_[list->owner]);
+        common = (std::max)(scale, common - of->coarser_[list->owner]);
         const auto [total, negative] = add(fine, common);
         list->owner = owner;
         rest.emplace_back(list->to_scale(total, scale, of->rounds_), negative);
@@ -289,8 +290,8 @@ class FixedBuilder : public FixedRecord {
         if (narrows && is_multiplied(node)) {
           // Its scale: owner of the narrow one.
           const int to =
-              std::min(result.scale, of->narrow_scale_.count(owner) > 0 ? of->narrow_scale_[owner]
-                                                                        : result.scale);
+              (std::min)(result.scale, of->narrow_scale_.count(owner) > 0 ? of->narrow_scale_[owner]
+                                                                          : result.scale);
           result = list->to_scale(result, to, of->rounds_);
           narrow.push_back(result.line);
           of->narrow_lines_.emplace_back(list, result.line, owner);
@@ -426,9 +427,9 @@ class FixedBuilder : public FixedRecord {
           int exponent = 0;
           if (is_short(t, odd, exponent)) continue;
           if (b.input_of(t.node) != nullptr) continue;
-          product = std::min(product, b.term(t, s, true, negative).scale);
+          product = (std::min)(product, b.term(t, s, true, negative).scale);
         }
-        int scale = fine == 1000 ? product : std::min(fine, product);
+        int scale = fine == 1000 ? product : (std::min)(fine, product);
         if (scale == 1000) scale = s + 16;
         left_over_scale_[static_cast<int>(i)] = scale > s ? scale : s + 1;
         again_ = true;
@@ -440,7 +441,7 @@ class FixedBuilder : public FixedRecord {
       Value to = update.sum(b.words[i], up, false);
       next_rest[i] = update.low_bits(acc, written.left_over[i]).line;
       LinearForm form = b.words[i].form;
-      form.resize(std::max(form.size(), acc.form.size()), 0.0);
+      form.resize((std::max)(form.size(), acc.form.size()), 0.0);
       for (std::size_t k = 0; k < acc.form.size(); ++k) form[k] += acc.form[k];
       b.values[node] = to;
       finish_row(i, to, form);

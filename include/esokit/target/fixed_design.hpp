@@ -157,7 +157,7 @@ class FixedDesign : public FixedBuilder {
                                    : update.roundings[j - 2].high;
       total += sums[j].most(low, high);
       const double d = direct(n + j);
-      total += std::max(std::fabs(d * low), std::fabs(d * high));
+      total += (std::max)(std::fabs(d * low), std::fabs(d * high));
     }
     return total;
   }
@@ -182,7 +182,7 @@ class FixedDesign : public FixedBuilder {
           else if (j == n)
             most += by * reference_most();
           else
-            most += by * std::max(-list.roundings[j - n - 1].low, list.roundings[j - n - 1].high);
+            most += by * (std::max)(-list.roundings[j - n - 1].low, list.roundings[j - n - 1].high);
         }
       } else if (one.operation == IntegerOperation::state) {
         most = reach[static_cast<std::size_t>(one.a)];
@@ -243,7 +243,7 @@ class FixedDesign : public FixedBuilder {
       shares[row] += part;
     }
     for (std::size_t i = 0; i < n; ++i) {
-      share_[i] = std::max(share_[i], found.deviation > 0 ? shares[i] / found.deviation : 0.0);
+      share_[i] = (std::max)(share_[i], found.deviation > 0 ? shares[i] / found.deviation : 0.0);
       if (reads && written.left_over[i] > 0)
         found.deviation += std::fabs(c[i]) * std::ldexp(1.0, -written.scale[i]);
     }
@@ -309,7 +309,7 @@ class FixedDesign : public FixedBuilder {
     double range = 0;
     for (std::size_t i = 0; i < n; ++i) range += std::fabs(exact_law_[i]) * reach[i];
     range += std::fabs(exact_law_[n]) * reference_most() + options_.u.most;
-    law_scale = std::min(16, static_cast<int>(std::floor(std::log2(fits / 2 / range))));
+    law_scale = (std::min)(16, static_cast<int>(std::floor(std::log2(fits / 2 / range))));
     if (given_ != nullptr) {
       if (law_scale < given_->law_scale) {
         return refuse_settings(std::ldexp(1.0, given_->law_scale - law_scale));
@@ -369,7 +369,8 @@ class FixedDesign : public FixedBuilder {
     written.law.assign(form.begin(), form.begin() + static_cast<std::ptrdiff_t>(n) + 1);
     double direct = 0.5;  // to whole counts
     for (std::size_t e = 0; e + n + 1 < form.size(); ++e) {
-      direct += std::fabs(form[n + 1 + e]) * std::max(-law.roundings[e].low, law.roundings[e].high);
+      direct +=
+          std::fabs(form[n + 1 + e]) * (std::max)(-law.roundings[e].low, law.roundings[e].high);
     }
     LinearForm c(written.law.begin(), written.law.begin() + static_cast<std::ptrdiff_t>(n));
     LinearForm exact(exact_law_.begin(), exact_law_.begin() + static_cast<std::ptrdiff_t>(n));
@@ -379,7 +380,7 @@ class FixedDesign : public FixedBuilder {
 
   bool judges_input() {
     const double most = options_.most_input_deviation > 0 ? options_.most_input_deviation
-                                                          : std::max(input.half_count, 1.0);
+                                                          : (std::max)(input.half_count, 1.0);
     if (rate > 0 && std::ldexp(rate, law_scale) < 64) {
       refusal = {
           "limits.rate",

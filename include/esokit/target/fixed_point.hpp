@@ -60,7 +60,7 @@ class FixedPlayer {
     held = up >= 0 ? up / one : -((-up + one - 1) / one);
     return held;
   }
-  [[nodiscard]] std::int64_t word(std::size_t i) const { return words_[i]; }
+  [[nodiscard]] std::int64_t next_word(std::size_t i) const { return words_[i]; }
   std::int64_t held = 0;
 
  private:
@@ -124,7 +124,7 @@ class FixedText {
     for (std::size_t i = 0; i < d_.states(); ++i) {
       if (!(std::fabs(d_.written.estimates[row][i]) > 0)) continue;
       c = d_.written.estimates[row][i];
-      scale = std::min(scale, d_.written.scale[i]);
+      scale = (std::min)(scale, d_.written.scale[i]);
       ++count;
     }
     while (count > 1) {
@@ -402,7 +402,7 @@ class FixedText {
         if (wraps) second = (counter + second) & ((std::int64_t(1) << options.y.counter_bits) - 1);
       } else {
         player.observe(y, second);
-        result = player.word(n - 1);
+        result = player.next_word(n - 1);
       }
       vectors += "    {" + text_of(wraps ? counter : y) + ", " + text_of(second) + ", " +
                  text_of(result) + "},\n";

@@ -68,10 +68,10 @@ class FixedRecord {
   /// So many samples after the last measurement the next can still be used: one, if the design has
   /// no table of gains, because they would go on.
   [[nodiscard]] int table_rows() const {
-    int rows = std::max(1, static_cast<int>(design_->gap_gains.size()));
+    int rows = (std::max)(1, static_cast<int>(design_->gap_gains.size()));
     if (wraps_) {
       const int half = (1 << (options_.y.counter_bits - 1)) - 1;
-      rows = std::min(rows, half / options_.y.most);
+      rows = (std::min)(rows, half / options_.y.most);
     }
     return rows;
   }

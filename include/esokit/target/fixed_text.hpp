@@ -158,7 +158,7 @@ typedef char $name_shifts_negative_numbers[(((-1) >> 1) == -1) ? 1 : -1];
 
 /* The path of bad samples is a function of its own, so that the other needs fewer registers. */
 #if defined(__GNUC__)
-#define $NAME_APART __attribute__((noinline))
+#define $NAME_APART __attribute__((__noinline__))
 #else
 #define $NAME_APART
 #endif

@@ -366,7 +366,7 @@ struct RecordAccess {
         if (all(!(law.now_.factor.variance(0) < law.ceiling()))) law.recur_at_ceiling();
       });
       add("filter_to_limit", "", [](Law& law, const auto&) {
-        if (law.now_.factor.near(law.limit_.factor, S(1e-3))) law.now_ = law.limit_;
+        if (law.now_.factor.close_to(law.limit_.factor, S(1e-3))) law.now_ = law.limit_;
       });
     }
   }

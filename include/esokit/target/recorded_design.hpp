@@ -40,12 +40,12 @@ template <class V>
     ends = ends || options.comment.find(mark) != std::string::npos;
   }
   Rules<V> rules;
-  rules.require(is_identifier(options.name), "name", V(0), "must be an identifier of C")
-      .require(is_identifier(options.settings_name), "settings_name", V(0),
-               "must be an identifier of C")
-      .require(1 <= options.self_test_samples && options.self_test_samples <= 10000,
-               "self_test_samples", static_cast<V>(options.self_test_samples), "must be 1 .. 10000")
-      .require(!ends, "comment", V(0), "must not begin or end a comment");
+  rules.demand(is_identifier(options.name), "name", V(0), "must be an identifier of C")
+      .demand(is_identifier(options.settings_name), "settings_name", V(0),
+              "must be an identifier of C")
+      .demand(1 <= options.self_test_samples && options.self_test_samples <= 10000,
+              "self_test_samples", static_cast<V>(options.self_test_samples), "must be 1 .. 10000")
+      .demand(!ends, "comment", V(0), "must not begin or end a comment");
   return rules;
 }
 
@@ -83,7 +83,7 @@ inline int note_call(RecordedDesign& design, std::string_view name, std::string_
   std::vector<std::string> names;
   while (!arguments.empty()) {
     names.emplace_back(arguments.substr(0, arguments.find(' ')));
-    arguments.remove_prefix(std::min(arguments.size(), names.back().size() + 1));
+    arguments.remove_prefix((std::min)(arguments.size(), names.back().size() + 1));
   }
   const int count = static_cast<int>(names.size());
   design.names.push_back({std::string(name), std::move(names), has_output});
@@ -544,8 +544,8 @@ Expected<RecordedDesign, Error<typename C::scalar_type>> recorded_design(
   using Numbers = typename Maker::Numbers;
 
   Rules<V> rules = checked_options<V>(options);
-  rules.require(!options.settings_in_struct, "settings_in_struct", V(1),
-                "is not written for PredictiveAdrc");
+  rules.demand(!options.settings_in_struct, "settings_in_struct", V(1),
+               "is not written for PredictiveAdrc");
   if (!rules) return rules.error();
   Maker maker(controller, options);
   RecordedDesign& design = maker.design;

@@ -71,7 +71,7 @@ struct OperationList {
 
   /// Notes an operation. @return its index, that of an equal one if there is one
   // Not inlined, as what follows that notes: a flattened step would hold it at each operation.
-  [[gnu::noinline]] int note(const Instruction& given) {
+  [[gnu::__noinline__]] int note(const Instruction& given) {
     for (std::size_t i = 0; i < instructions.size(); ++i) {
       const Instruction& one = instructions[i];
       if (one.operation == given.operation && one.a == given.a && one.b == given.b &&
@@ -118,9 +118,9 @@ class RecordedCondition {
   /// @endcond
 
   /// Does not compile: both ways of a branch would have to be recorded.
-  template <std::same_as<bool> Bool>
-  explicit operator Bool() const {
-    static_assert(!std::same_as<Bool, bool>,
+  template <std::same_as<bool> Result>
+  explicit operator Result() const {
+    static_assert(!std::same_as<Result, bool>,
                   "esokit: a branch on a value cannot be recorded: instead of if, ?:, min and max "
                   "write select(condition, a, b)");
     return false;
@@ -159,9 +159,9 @@ class RecordedCondition {
   }
 
  private:
-  [[nodiscard, gnu::noinline]] RecordedCondition with(Operation operation,
-                                                      const RecordedCondition& b,
-                                                      bool holds) const {
+  [[nodiscard, gnu::__noinline__]] RecordedCondition with(Operation operation,
+                                                          const RecordedCondition& b,
+                                                          bool holds) const {
     OperationList& list = *noted_.list;
     return {holds,
             {&list, list.note({.operation = operation, .a = noted_.index, .b = b.noted_.index})}};
@@ -283,8 +283,8 @@ class RecordingScalar {
   /// @}
 
  private:
-  [[nodiscard, gnu::noinline]] static Self chosen(const RecordedCondition& condition, const Self& a,
-                                                  const Self& b) {
+  [[nodiscard, gnu::__noinline__]] static Self chosen(const RecordedCondition& condition,
+                                                      const Self& a, const Self& b) {
     Self chosen = condition.holds() ? a : b;
     if (condition.noted().known()) return chosen;
     OperationList& list = *condition.noted().list;
@@ -298,27 +298,27 @@ class RecordingScalar {
     chosen.noted_ = {&list, index};
     return chosen;
   }
-  [[nodiscard, gnu::noinline]] Self with(Operation operation, V value) const {
+  [[nodiscard, gnu::__noinline__]] Self with(Operation operation, V value) const {
     Self result(static_cast<double>(value));
     if (!is_constant()) {
       result.noted_ = {noted_.list, noted_.list->note({.operation = operation, .a = noted_.index})};
     }
     return result;
   }
-  [[nodiscard, gnu::noinline]] detail::Noted both(Operation operation, const Self& b) const {
+  [[nodiscard, gnu::__noinline__]] detail::Noted both(Operation operation, const Self& b) const {
     if (is_constant() && b.is_constant()) return {};
     OperationList& list = is_constant() ? *b.noted_.list : *noted_.list;
     const int first = index_in(list);
     const int second = b.index_in(list);
     return {&list, list.note({.operation = operation, .a = first, .b = second})};
   }
-  [[nodiscard, gnu::noinline]] Self with(Operation operation, const Self& b, V value) const {
+  [[nodiscard, gnu::__noinline__]] Self with(Operation operation, const Self& b, V value) const {
     Self result(static_cast<double>(value));
     result.noted_ = both(operation, b);
     return result;
   }
-  [[nodiscard, gnu::noinline]] RecordedCondition compared(Operation operation, const Self& b,
-                                                          bool holds) const {
+  [[nodiscard, gnu::__noinline__]] RecordedCondition compared(Operation operation, const Self& b,
+                                                              bool holds) const {
     return {holds, both(operation, b)};
   }
 
@@ -343,7 +343,7 @@ inline constexpr bool records<RecordingScalar<V>> = true;
 namespace detail {
 
 template <class V>
-struct Absolute<RecordingScalar<V>> {
+struct AbsoluteValue<RecordingScalar<V>> {
   static RecordingScalar<V> of(const RecordingScalar<V>& value) { return value.magnitude(); }
 };
 

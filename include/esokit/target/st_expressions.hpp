@@ -258,7 +258,7 @@ class StExpressions : public StFile {
       const bool single = word.back() == 'f' && word[1] != 'x';
       if (!single && text.find('.') != std::string::npos) {
         const double value = std::strtod(word.c_str(), nullptr);
-        const double size = std::abs(value);
+        const double size = (std::abs)(value);
         if (size > 1e37 || (size > 0 && size < 1e-37)) return scaled(value);
       }
       return {text,
@@ -374,10 +374,10 @@ class StExpressions : public StFile {
   }
   /// An LREAL beyond what a REAL holds, which not each compiler takes: times a power of 2^126.
   Value scaled(double value) {
-    const bool up = std::abs(value) > 1;
+    const bool up = (std::abs)(value) > 1;
     const double by = up ? 0x1p-126 : 0x1p126;
     int times = 0;
-    for (; std::abs(value) > 1e37 || std::abs(value) < 1e-37; ++times) value *= by;
+    for (; (std::abs)(value) > 1e37 || (std::abs)(value) < 1e-37; ++times) value *= by;
     const std::string name = helper(
         up ? "scaled_up" : "scaled_down", "LREAL", "x : LREAL;\n  times : UDINT", "i : UDINT",
         std::string("  $f := x;\n  FOR i := 1 TO times DO\n    $f := $f * ") +

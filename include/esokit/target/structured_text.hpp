@@ -94,10 +94,10 @@ struct StructuredText {
   template <class V>
   [[nodiscard]] Expected<std::string, Error<V>> expected(const std::string& which) const {
     Rules<V> rules;
-    rules.require(is_named, "name", V(0),
-                  "must be no word of Structured Text, without two _ or one at its end");
-    rules.require(error.empty(), "structured_text", V(0),
-                  "cannot be written: its C has what is not translated (a defect of esokit)");
+    rules.demand(is_named, "name", V(0),
+                 "must be no word of Structured Text, without two _ or one at its end");
+    rules.demand(error.empty(), "structured_text", V(0),
+                 "cannot be written: its C has what is not translated (a defect of esokit)");
     if (!rules) return rules.error();
     return which;
   }

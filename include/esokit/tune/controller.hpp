@@ -46,7 +46,7 @@ std::vector<std::complex<double>> placed_poles(const TuneModel& model, const Tun
     // -w / 2 (1 + j cot(theta / 2)), see gain/half_gain.hpp
     for (int k = 0; k < size; ++k) {
       const bool real = 2 * k + 1 == size;
-      const double half = 0.5 * std::numbers::pi * (2 * std::min(k, size - 1 - k) + 1) / size;
+      const double half = 0.5 * std::numbers::pi * (2 * (std::min)(k, size - 1 - k) + 1) / size;
       const double imaginary = real ? 0.0 : 0.5 * w / std::tan(half);
       poles[static_cast<std::size_t>(k)] = {-0.5 * w, 2 * k < size ? -imaginary : imaginary};
     }
@@ -63,12 +63,13 @@ std::vector<std::complex<double>> placed_poles(const TuneModel& model, const Tun
       }
     }
     poles = poles_of(error);
-    std::sort(poles.begin(), poles.end(),
-              [](const auto& a, const auto& b) { return std::abs(a.imag()) < std::abs(b.imag()); });
+    std::sort(poles.begin(), poles.end(), [](const auto& a, const auto& b) {
+      return (std::abs)(a.imag()) < (std::abs)(b.imag());
+    });
     for (std::size_t i = 0; i < poles.size(); ++i) {
       // By rounding, computed conjugates may differ.
       const bool pair =
-          i + 1 < poles.size() && std::abs(poles[i].imag()) > 1e-9 * std::abs(poles[i]);
+          i + 1 < poles.size() && (std::abs)(poles[i].imag()) > 1e-9 * (std::abs)(poles[i]);
       poles[i] = std::log(1.0 + (pair ? poles[i] : std::complex<double>(poles[i].real()))) / T;
       if (pair) {
         poles[i + 1] = std::conj(poles[i]);
@@ -94,13 +95,13 @@ template <int Order, class S = double, class Visit>
 Check<double> with_controller(const TuneModel& model, const TunedDesign& design,
                               const Visit& visit) {
   Rules<double> rules;
-  rules.all_of(model.check())
-      .require(model.order == Order,
-               {"order", static_cast<double>(model.order), "is not the requested order, which is",
-                -1, static_cast<double>(Order), true})
-      .require(!design.knows.sensor && !design.knows.sinusoid, "knows", 1.0,
-               "includes more than the lag: use the code of the design")
-      .require(
+  rules.all_of(model.validate())
+      .demand(model.order == Order,
+              {"order", static_cast<double>(model.order), "is not the requested order, which is",
+               -1, static_cast<double>(Order), true})
+      .demand(!design.knows.sensor && !design.knows.sinusoid, "knows", 1.0,
+              "includes more than the lag: use the code of the design")
+      .demand(
           static_cast<int>(design.settings.gains.size()) == Order + (design.knows.lag ? 1 : 0) &&
               design.extension >= 1 && design.extension <= 2 && design.levels >= 1 &&
               design.levels <= 3 &&

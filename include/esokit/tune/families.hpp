@@ -274,7 +274,7 @@ inline double observer_mean(TuneFamily family, const ObserverKind& kind, const T
                             const TuneSettings& s) {
   if (family == TuneFamily::free_poles) {
     double logarithm = 0.0;
-    for (const auto& pole : s.observer_poles) logarithm += std::log(std::abs(pole));
+    for (const auto& pole : s.observer_poles) logarithm += std::log((std::abs)(pole));
     return std::exp(logarithm / static_cast<double>(s.observer_poles.size()));
   }
   if (family == TuneFamily::filter) {
@@ -294,7 +294,7 @@ inline double law_mean(const std::vector<double>& gains, int order) {
     companion(n - 1, i) = -gains[static_cast<std::size_t>(i)];
   }
   std::vector<double> size;
-  for (const auto& pole : poles_of(companion)) size.push_back(std::abs(pole));
+  for (const auto& pole : poles_of(companion)) size.push_back((std::abs)(pole));
   std::sort(size.begin(), size.end());
   double logarithm = 0.0;
   for (int i = 0; i < order; ++i) logarithm += std::log(size[static_cast<std::size_t>(i)]);

@@ -64,7 +64,7 @@ class FastResponse {
     for (int m = 1; m + 1 < n_; ++m) {
       int pivot = m;
       for (int i = m + 1; i < n_; ++i) {
-        if (std::abs(h_(i, m - 1)) > std::abs(h_(pivot, m - 1))) pivot = i;
+        if ((std::abs)(h_(i, m - 1)) > (std::abs)(h_(pivot, m - 1))) pivot = i;
       }
       if (h_(pivot, m - 1) == 0.0) continue;
       if (pivot != m) {
@@ -90,16 +90,16 @@ class FastResponse {
     std::complex<double> turn;  ///< det(value - A) divided by its magnitude
   };
   [[nodiscard]] Answer at(std::complex<double> value) {
-    using Complex = std::complex<double>;
-    Complex* const m = work_.data();
-    Complex* const x = m + n_ * n_;
-    const auto entry = [&](int i, int j) -> Complex& { return m[i * n_ + j]; };
+    using ComplexNumber = std::complex<double>;
+    ComplexNumber* const m = work_.data();
+    ComplexNumber* const x = m + n_ * n_;
+    const auto entry = [&](int i, int j) -> ComplexNumber& { return m[i * n_ + j]; };
     for (int i = 0; i < n_; ++i) {
-      for (int j = std::max(i - 1, 0); j < n_; ++j) entry(i, j) = -h_(i, j);
+      for (int j = (std::max)(i - 1, 0); j < n_; ++j) entry(i, j) = -h_(i, j);
       entry(i, i) += value;
       x[i] = b_(i, 0);
     }
-    Complex turn = 1.0;
+    ComplexNumber turn = 1.0;
     for (int k = 0; k < n_; ++k) {
       if (k + 1 < n_) {
         if (std::norm(entry(k + 1, k)) > std::norm(entry(k, k))) {
@@ -107,16 +107,16 @@ class FastResponse {
           std::swap(x[k], x[k + 1]);
           turn = -turn;
         }
-        const Complex factor = divided(entry(k + 1, k), entry(k, k));
+        const ComplexNumber factor = divided(entry(k + 1, k), entry(k, k));
         for (int j = k + 1; j < n_; ++j) entry(k + 1, j) -= times(factor, entry(k, j));
         x[k + 1] -= times(factor, x[k]);
       }
       const double size = std::sqrt(std::norm(entry(k, k)));
       turn = times(turn, entry(k, k) / size);
     }
-    Complex gain = d_;
+    ComplexNumber gain = d_;
     for (int k = n_ - 1; k >= 0; --k) {
-      Complex sum = x[k];
+      ComplexNumber sum = x[k];
       for (int j = k + 1; j < n_; ++j) sum -= times(entry(k, j), x[j]);
       x[k] = divided(sum, entry(k, k));
       gain += c_(0, k) * x[k];
@@ -152,23 +152,24 @@ struct Aliases {
 
 /// @param gain factor on b0 @param range by how much the dead time may differ either way, s
 inline Aliases aliases(const TuneModel& model, double gain, double w, double range) {
-  using Complex = std::complex<double>;
+  using ComplexNumber = std::complex<double>;
   const double T = model.sample_time;
-  const Complex held = 1.0 - std::polar(1.0, -w * T);
+  const ComplexNumber held = 1.0 - std::polar(1.0, -w * T);
   constexpr int most = 10;
-  Complex parts[2 * most + 1];
+  ComplexNumber parts[2 * most + 1];
   Aliases found;
   for (int k = -most; k <= most; ++k) {
-    const Complex s(0.0, w + 2.0 * std::numbers::pi * k / T);
-    Complex part = gain * model.input_gain.value * held /
-                   (s * T * (s + model.pole) * (1.0 + model.lag * s) * (1.0 + model.sensor * s));
+    const ComplexNumber s(0.0, w + 2.0 * std::numbers::pi * k / T);
+    ComplexNumber part =
+        gain * model.input_gain.value * held /
+        (s * T * (s + model.pole) * (1.0 + model.lag * s) * (1.0 + model.sensor * s));
     for (int i = 1; i < model.order; ++i) part /= s;
     part *= std::exp(-s * model.dead_time);
     parts[k + most] = part;
-    if (k != 0) found.rest += std::abs(part);
+    if (k != 0) found.rest += (std::abs)(part);
   }
   found.base = parts[most];
-  found.size = std::abs(found.base);
+  found.size = (std::abs)(found.base);
   if (range >= 0.5 * T) return found;
   // A cell is short enough for a straight line: at most 0.4 rad of the frequency itself, and where
   // the others count, an eighth of a turn of the nearest two.
@@ -188,7 +189,7 @@ inline Aliases aliases(const TuneModel& model, double gain, double w, double ran
 
 /// The plant and its disturbances, prepared for evaluating any controller.
 class LoopCost {
-  using Complex = std::complex<double>;
+  using ComplexNumber = std::complex<double>;
 
  public:
   /// @param model checked model @param rules required margins @param slowest rad/s, well below all
@@ -201,14 +202,14 @@ class LoopCost {
       others.push_back(detail::sampled_plant(detail::dense_plant(variant.model, variant.gain),
                                              model.sample_time));
     }
-    variants_ = std::min(others.size(), most_variants);
+    variants_ = (std::min)(others.size(), most_variants);
     const detail::SampledPlant plant =
         detail::sampled_plant(detail::dense_plant(model), model.sample_time);
     const auto poles = detail::poles_of(plant.a);
     plant_states_ = plant.a.rows();
     // By how much latencies may differ from the middle one, which is less than the largest by that.
     range_ = 0.5 * (model.latency_half_width +
-                    std::min(model.latency_half_width, model.lag + model.dead_time));
+                    (std::min)(model.latency_half_width, model.lag + model.dead_time));
     const auto middle = [&](TuneModel other, double late) {
       other.dead_time += late - range_;
       return other;
@@ -216,22 +217,22 @@ class LoopCost {
     const auto add = [&](double w, double density, double load) {
       // z - 1 as 2 j sin(wT/2) e^(j wT/2), which does not cancel for small angles.
       const double half = 0.5 * w * T_;
-      const Complex value = Complex(0.0, 2.0 * std::sin(half)) * std::polar(1.0, half);
+      const ComplexNumber value = ComplexNumber(0.0, 2.0 * std::sin(half)) * std::polar(1.0, half);
       Point p;
       p.frequency = w;
       p.value = value;
       p.plant = detail::response(plant, value)(0, 0);
       p.load = detail::response(plant, value, true)(0, 0);
       p.aliases[0] = detail::aliases(middle(model, model.latency_half_width), 1.0, w, range_);
-      p.turned = std::polar(1.0, std::min(w * range_, std::numbers::pi));
+      p.turned = std::polar(1.0, (std::min)(w * range_, std::numbers::pi));
       for (std::size_t v = 0; v < variants_; ++v) {
         p.ratio[v] = detail::response(others[v], value)(0, 0) / p.plant;
         p.aliases[v + 1] =
             detail::aliases(middle(variants[v].model, 0.0), variants[v].gain, w, range_);
       }
       p.turn = 1.0;
-      for (const Complex& pole : poles) {
-        const Complex factor = value - pole;
+      for (const ComplexNumber& pole : poles) {
+        const ComplexNumber factor = value - pole;
         p.turn *= factor / std::sqrt(std::norm(factor));
       }
       p.noise_power = density * model.noise * model.noise;
@@ -263,37 +264,37 @@ class LoopCost {
     numbers.modulus = numbers.delay = numbers.tolerance = numbers.phase =
         std::numeric_limits<double>::infinity();
     double output = 0.0, control = 0.0, noise = 0.0;
-    Complex before[3];
+    ComplexNumber before[3];
     double turned[3] = {};
     Trail trails[most_variants + 1];
     for (std::size_t i = 0; i < points_.size(); ++i) {
       const Point& p = points_[i];
       const auto c = response.at(p.value);
-      const Complex loop = -p.plant * c.gain;
-      const Complex sensitivity = 1.0 / (1.0 + loop);
-      const Complex cs = c.gain * sensitivity;
+      const ComplexNumber loop = -p.plant * c.gain;
+      const ComplexNumber sensitivity = 1.0 / (1.0 + loop);
+      const ComplexNumber cs = c.gain * sensitivity;
       const double caused = std::norm(cs) * p.noise_power;
       noise += caused;
       output += std::norm(loop * sensitivity) * p.noise_power +
                 std::norm(p.load * sensitivity) * p.load_power;
       control += caused + std::norm(1.0 / b0_ + cs * p.load) * p.load_power;
       if (i >= walked_) continue;
-      const Complex turn = p.turn * c.turn;
+      const ComplexNumber turn = p.turn * c.turn;
       // Also with b0 wrong by the factor at the ends of its interval.
-      const Complex scales[] = {loop, factor_ * (variants_ > 0 ? p.ratio[0] : 1.0) * loop,
-                                1.0 / factor_ * (variants_ > 1 ? p.ratio[1] : 1.0) * loop};
+      const ComplexNumber scales[] = {loop, factor_ * (variants_ > 0 ? p.ratio[0] : 1.0) * loop,
+                                      1.0 / factor_ * (variants_ > 1 ? p.ratio[1] : 1.0) * loop};
       for (std::size_t g = 0; g < 3; ++g) {
-        const Complex now = turn * (1.0 + scales[g]);
+        const ComplexNumber now = turn * (1.0 + scales[g]);
         turned[g] += i == 0 ? std::arg(now) : std::arg(now * std::conj(before[g]));
         before[g] = now;
       }
       if (i > 0 && std::signbit(loop.imag()) != std::signbit(trails[0].loop.imag())) {
-        const Complex last = trails[0].loop;
+        const ComplexNumber last = trails[0].loop;
         const double share = last.imag() / (last.imag() - loop.imag());
         const double real = last.real() + share * (loop.real() - last.real());
         // If both are large, a pole at frequency zero has turned L: this is no crossing.
         if (real < 0.0 && is_finite(real)) {
-          numbers.tolerance = std::min(numbers.tolerance, std::max(-real, -1.0 / real));
+          numbers.tolerance = (std::min)(numbers.tolerance, (std::max)(-real, -1.0 / real));
         }
       }
       const double size = std::sqrt(std::norm(c.gain));
@@ -304,11 +305,11 @@ class LoopCost {
     }
     const double whole = std::numbers::pi * (plant_states_ + controller.states());
     bool stable[3];
-    for (std::size_t g = 0; g < 3; ++g) stable[g] = std::abs(turned[g] - whole) < 1.0;
+    for (std::size_t g = 0; g < 3; ++g) stable[g] = (std::abs)(turned[g] - whole) < 1.0;
     numbers.stable = stable[0] && is_finite(output) && is_finite(control);
     numbers.tolerant = stable[1] && stable[2];
     for (const Trail& trail : trails) {
-      numbers.modulus = std::min(numbers.modulus, std::sqrt(trail.least));
+      numbers.modulus = (std::min)(numbers.modulus, std::sqrt(trail.least));
     }
     numbers.output = std::sqrt(output);
     numbers.control = std::sqrt(control);
@@ -321,9 +322,9 @@ class LoopCost {
 
   struct Point {
     double frequency;
-    Complex value, plant, load, turn;
-    Complex ratio[most_variants];                ///< ratio of the other plants to this one
-    Complex turned;                              ///< by the range of latencies, half a turn at most
+    ComplexNumber value, plant, load, turn;
+    ComplexNumber ratio[most_variants];          ///< ratio of the other plants to this one
+    ComplexNumber turned;                        ///< by the range of latencies, half a turn at most
     detail::Aliases aliases[most_variants + 1];  ///< of all plants at the middle latency
     double noise_power, load_power;
   };
@@ -332,12 +333,13 @@ class LoopCost {
   struct Trail {
     double least = std::numeric_limits<double>::infinity();  ///< abs(1 + L)^2
     double square[2] = {};
-    Complex loop{}, largest{};
+    ComplexNumber loop{}, largest{};
   };
 
   /// @param gain of the controller @param size its magnitude
-  void margins(LoopNumbers& numbers, Trail& trail, Complex loop, const detail::Aliases& aliases,
-               Complex gain, double size, std::size_t i) const {
+  void margins(LoopNumbers& numbers, Trail& trail, ComplexNumber loop,
+               const detail::Aliases& aliases, ComplexNumber gain, double size,
+               std::size_t i) const {
     const Point& p = points_[i];
     const double base = size * aliases.size, rest = size * aliases.rest;
     double now = std::norm(1.0 + loop);
@@ -345,43 +347,44 @@ class LoopCost {
     if (range_ > 0.0 ? base - rest < 5.0 : now < 16.0) {
       // As near to -1 as a latency of the range brings it.
       if (range_ > 0.0 && aliases.cells > 0) {
-        Complex from = 1.0 - gain * aliases.sums[0];
+        ComplexNumber from = 1.0 - gain * aliases.sums[0];
         for (int cell = 1; cell <= aliases.cells; ++cell) {
-          const Complex to = 1.0 - gain * aliases.sums[cell];
-          const Complex step = to - from;
+          const ComplexNumber to = 1.0 - gain * aliases.sums[cell];
+          const ComplexNumber step = to - from;
           const double share = -(from.real() * step.real() + from.imag() * step.imag());
           const double length = std::norm(step);
-          now = std::min(now, share <= 0.0 ? std::norm(from)
-                              : share >= length
-                                  ? std::norm(to)
-                                  : std::max(std::norm(from) - share * share / length, 0.0));
+          now = (std::min)(now, share <= 0.0 ? std::norm(from)
+                                : share >= length
+                                    ? std::norm(to)
+                                    : (std::max)(std::norm(from) - share * share / length, 0.0));
           from = to;
         }
       } else if (range_ > 0.0) {
-        const Complex middle = aliases.base * gain;
+        const ComplexNumber middle = aliases.base * gain;
         const double nearest =
             middle.real() >= base * p.turned.real()
                 ? base
-                : middle.real() * p.turned.real() + std::abs(middle.imag()) * p.turned.imag();
-        const double distance = std::max(std::sqrt(1.0 + base * base - 2.0 * nearest) - rest, 0.0);
-        now = std::min(now, distance * distance);
+                : middle.real() * p.turned.real() + (std::abs)(middle.imag()) * p.turned.imag();
+        const double distance =
+            (std::max)(std::sqrt(1.0 + base * base - 2.0 * nearest) - rest, 0.0);
+        now = (std::min)(now, distance * distance);
       }
       double least = now;
       // A parabola through three points of which the middle one is smallest.
       if (i >= 2 && trail.square[1] <= trail.square[0] && trail.square[1] <= now) {
         const double bend = trail.square[0] - 2.0 * trail.square[1] + now;
         const double slope = 0.5 * (now - trail.square[0]);
-        least = bend > 0.0 ? std::max(trail.square[1] - 0.5 * slope * slope / bend, 0.0)
+        least = bend > 0.0 ? (std::max)(trail.square[1] - 0.5 * slope * slope / bend, 0.0)
                            : trail.square[1];
       }
-      trail.least = std::min(trail.least, least);
+      trail.least = (std::min)(trail.least, least);
     }
     // The largest latency is the middle one and the range.
-    const auto delay = [&](Complex there, double w) {
-      numbers.delay = std::min(numbers.delay, detail::lag_to_minus_one(there) / w - range_);
-      numbers.phase = std::min(numbers.phase, std::abs(std::arg(-there)) - w * range_);
+    const auto delay = [&](ComplexNumber there, double w) {
+      numbers.delay = (std::min)(numbers.delay, detail::lag_to_minus_one(there) / w - range_);
+      numbers.phase = (std::min)(numbers.phase, (std::abs)(std::arg(-there)) - w * range_);
     };
-    const Complex largest = -(1.0 + aliases.rest / aliases.size) * aliases.base * gain;
+    const ComplexNumber largest = -(1.0 + aliases.rest / aliases.size) * aliases.base * gain;
     const double b = std::norm(largest);
     if (i > 0) {
       const double a = std::norm(trail.largest);

@@ -65,8 +65,8 @@ inline DynamicMatrix<double> solve_riccati(DynamicMatrix<double> a, const Dynami
     a = product(a, ia);
     double change = 0.0, size = 0.0;
     for (int i = 0; i < n; ++i) {
-      change = std::max(change, std::abs(more(i, i)) / std::max(q(i, i), 1e-300));
-      size = std::max(size, q(i, i));
+      change = (std::max)(change, (std::abs)(more(i, i)) / (std::max)(q(i, i), 1e-300));
+      size = (std::max)(size, q(i, i));
     }
     if (!(change > 1e-15) || !is_finite(size)) break;
   }

@@ -96,7 +96,7 @@ Expected<AdrcTuning<S>, Error<S>> adrc_from_pid(const PidGains<S>& pid, S bandwi
   const S rate = pid.integral / pid.proportional;
   rules.nonzero("proportional", pid.proportional)
       .nonzero("integral", pid.integral)
-      .require(rate > S(0), "integral", pid.integral, "must have the sign of proportional")
+      .demand(rate > S(0), "integral", pid.integral, "must have the sign of proportional")
       .positive("bandwidth_ratio", bandwidth_ratio);
   if (!rules) return rules.error();
   AdrcTuning<S> tuning;
@@ -111,7 +111,7 @@ Expected<AdrcTuning<S>, Error<S>> adrc_from_pid(const PidGains<S>& pid, S bandwi
   } else {
     const S ratio = rate * pid.derivative / pid.proportional;  // K_i K_d / K_p^2
     rules.nonzero("derivative", pid.derivative)
-        .require(ratio > S(0), "derivative", pid.derivative, "must have the sign of proportional")
+        .demand(ratio > S(0), "derivative", pid.derivative, "must have the sign of proportional")
         .above("bandwidth_ratio", bandwidth_ratio, S(1));
     if (!rules) return rules.error();
     // (1 - 4q) kappa^2 + (6 - 12q) kappa + (3 - 9q) = 0 with q = K_i K_d / K_p^2, its larger root.

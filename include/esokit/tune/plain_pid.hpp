@@ -39,7 +39,7 @@ struct PlainPidConfig {
   [[nodiscard]] Filter filter() const {
     if (!(filter_frequency > 0.0)) return {0.0, 0.0, 1.0};
     const double x = filter_frequency * sample_time, z = filter_damping;
-    const double root = std::sqrt(std::abs(1.0 - z * z)) * x, decay = std::exp(-z * x);
+    const double root = std::sqrt((std::abs)(1.0 - z * z)) * x, decay = std::exp(-z * x);
     const double sum =
         z < 1.0 ? 2.0 * decay * std::cos(root) : std::exp(root - z * x) + std::exp(-root - z * x);
     const double product = decay * decay;
@@ -51,21 +51,20 @@ struct PlainPidConfig {
   }
 
   /// An error for a number that is not allowed.
-  [[nodiscard]] Check<double> check() const {
+  [[nodiscard]] Check<double> validate() const {
     Rules<double> rules;
-    rules.require(is_finite(proportional), "proportional", proportional, "must be finite")
-        .require(is_finite(integral), "integral", integral, "must be finite")
-        .require(is_finite(derivative), "derivative", derivative, "must be finite")
+    rules.demand(is_finite(proportional), "proportional", proportional, "must be finite")
+        .demand(is_finite(integral), "integral", integral, "must be finite")
+        .demand(is_finite(derivative), "derivative", derivative, "must be finite")
         .not_negative("derivative_filter", derivative_filter)
         .not_negative("filter_frequency", filter_frequency)
         .positive("filter_damping", filter_damping)
-        .require(is_finite(reference_weight), "reference_weight", reference_weight,
-                 "must be finite")
+        .demand(is_finite(reference_weight), "reference_weight", reference_weight, "must be finite")
         .not_negative("tracking_time", tracking_time)
         .positive("sample_time", sample_time)
-        .require(lower < upper, "upper", upper, "must be above lower")
-        .require(!(tracking_time > 0.0 && tracking_time < sample_time), "tracking_time",
-                 tracking_time, "must be 0 or at least a sample");
+        .demand(lower < upper, "upper", upper, "must be above lower")
+        .demand(!(tracking_time > 0.0 && tracking_time < sample_time), "tracking_time",
+                tracking_time, "must be 0 or at least a sample");
     if (!rules) return rules.error();
     return {};
   }
@@ -79,7 +78,7 @@ class PlainPid {
 
   /// @return error for a number that is not allowed
   [[nodiscard]] static Expected<PlainPid, Error<double>> make(const Config& config) {
-    if (auto ok = config.check(); !ok) return ok.error();
+    if (auto ok = config.validate(); !ok) return ok.error();
     return PlainPid(config);
   }
 

@@ -73,7 +73,7 @@ inline std::vector<detail::PlantVariant> played_variants(const TuneModel& model)
   if (!model.may_rub()) return all;
   std::vector<double> frictions;
   const double unit =
-      5.0 * (model.u_max - model.u_min) * std::abs(model.input_gain.value) * model.latency();
+      5.0 * (model.u_max - model.u_min) * (std::abs)(model.input_gain.value) * model.latency();
   for (const double share : played_frictions) frictions.push_back(share * unit);
   if (model.friction) frictions = {*model.friction};
   for (const double friction : frictions) {
@@ -115,7 +115,7 @@ namespace detail {
 inline LinearController told_of_input(const LinearController& own) {
   LinearController c = own;
   double told = 0.0;
-  for (int i = 0; i < c.states(); ++i) told += std::abs(c.from_u(i, 0));
+  for (int i = 0; i < c.states(); ++i) told += (std::abs)(c.from_u(i, 0));
   if (told > 0.0) return c;
   // A reference reaches the states by u alone.
   for (int i = 0; i < c.states(); ++i) {
@@ -185,7 +185,7 @@ class PlayLoop {
         half_(half),
         x_(static_cast<std::size_t>(plant_.a.rows())),
         z_(static_cast<std::size_t>(told.states())),
-        next_(std::max(x_.size(), z_.size())),
+        next_((std::max)(x_.size(), z_.size())),
         held_(static_cast<std::size_t>(plant_.whole[0]) + 2),
         soften_(softened_input(law, model.sample_time, half)) {
     if (model.order != 3 || !(model.friction.value_or(0.0) > 0.0)) return;
@@ -259,11 +259,12 @@ class PlayLoop {
 /// How far an event goes: what its share of half the range of u moves the chain in its time; of
 /// order 1 at most 60 % of what u holds against the pole. @param gain factor on b0 of the plant
 inline double play_distance(const TuneModel& model, double gain, const PlayEvent& event) {
-  const double force = 0.5 * (model.u_max - model.u_min) * std::abs(gain * model.input_gain.value);
-  double far = event.share * force;
-  for (int i = 1; i <= model.order; ++i) far *= event.latencies * model.latency() / i;
-  const double pull = std::abs(model.pole);
-  return model.order == 1 && pull > 0.0 ? std::min(far, 0.6 * force / pull) : far;
+  const double force =
+      0.5 * (model.u_max - model.u_min) * (std::abs)(gain * model.input_gain.value);
+  double distance = event.share * force;
+  for (int i = 1; i <= model.order; ++i) distance *= event.latencies * model.latency() / i;
+  const double pull = (std::abs)(model.pole);
+  return model.order == 1 && pull > 0.0 ? (std::min)(distance, 0.6 * force / pull) : distance;
 }
 
 /// Plays one event from rest, with u about the middle of its range and the noise of the model.
@@ -281,15 +282,15 @@ Played play(const TuneModel& model, double gain, const LinearController& control
   const double T = model.sample_time;
   const double latency = model.latency();
   const double half = 0.5 * (model.u_max - model.u_min);
-  const double force = std::abs(gain * model.input_gain.value) * half;
+  const double force = (std::abs)(gain * model.input_gain.value) * half;
   const double length = event.latencies * latency;
   Played result;
-  const double pull = std::abs(model.pole);
+  const double pull = (std::abs)(model.pole);
   // Below 60 % of what u brings back.
   if (model.pole < 0.0) {
     const double grown = event.kind == PlayKind::kick ? event.share * length * pull
                          : event.kind == PlayKind::load
-                             ? std::expm1(pull * length) * std::max(event.share - 1.0, 0.0) +
+                             ? std::expm1(pull * length) * (std::max)(event.share - 1.0, 0.0) +
                                    event.share * pull * latency
                              : 0.0;
     result.counts = grown < 0.6;
@@ -299,7 +300,7 @@ Played play(const TuneModel& model, double gain, const LinearController& control
   sim::Gaussian gaussian(1);
   const double r = event.kind == PlayKind::step ? play_distance(model, gain, event) : 0.0;
   const auto samples_of = [T](double time) {
-    return static_cast<long>(std::min(std::ceil(time / T), 1e6));
+    return static_cast<long>((std::min)(std::ceil(time / T), 1e6));
   };
   const long pushed = event.kind == PlayKind::load   ? samples_of(length)
                       : event.kind == PlayKind::kick ? 1
@@ -308,24 +309,24 @@ Played play(const TuneModel& model, double gain, const LinearController& control
   // Friction holds for long, and then y moves again.
   const bool rubs = model.friction.value_or(0.0) > 0.0;
   const long last =
-      pushed + std::min(samples_of((rubs ? 0.0 : 25.0 * length) + 10.0 * settling_time), 200000L);
+      pushed + (std::min)(samples_of((rubs ? 0.0 : 25.0 * length) + 10.0 * settling_time), 200000L);
   const long quiet =
-      std::min(samples_of((rubs ? 2.0 : 1.0) * std::max(settling_time, 20.0 * latency)),
-               rubs ? 16000L : 4000L);
+      (std::min)(samples_of((rubs ? 2.0 : 1.0) * (std::max)(settling_time, 20.0 * latency)),
+                 rubs ? 16000L : 4000L);
   long since = 0, at_limits = 0;
   for (long k = 0; k < last; ++k) {
     const double y = loop.output();
     const double u = loop(y + model.noise * gaussian.next(), r, k < pushed ? d : 0.0);
     on_sample(static_cast<double>(k) * T, r, y, u);
     if (!is_finite(y)) return result;
-    result.peak = std::max(result.peak, std::abs(y - r));
-    if (r > 0.0) result.beyond = std::max(result.beyond, (y - r) / r);
-    if (k < pushed || std::abs(y - r) > 0.02 * result.peak + 4.0 * model.noise) {
+    result.peak = (std::max)(result.peak, (std::abs)(y - r));
+    if (r > 0.0) result.beyond = (std::max)(result.beyond, (y - r) / r);
+    if (k < pushed || (std::abs)(y - r) > 0.02 * result.peak + 4.0 * model.noise) {
       since = k + 1;
       at_limits = 0;
       continue;
     }
-    at_limits += std::abs(u) >= half ? 1 : 0;
+    at_limits += (std::abs)(u) >= half ? 1 : 0;
     if (k - since < quiet) continue;
     if (4 * at_limits <= quiet) {
       result.back = true;

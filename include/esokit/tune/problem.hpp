@@ -73,23 +73,22 @@ struct TuneModel {
 
   /// An error for a number that is not allowed, or so large or small that nothing can be computed
   /// with it.
-  [[nodiscard]] Check<double> check() const {
+  [[nodiscard]] Check<double> validate() const {
     Rules<double> rules;
     const auto size_fits = [&](const char* field, double value) {
-      rules.require(std::abs(value) >= 1e-60 && std::abs(value) <= 1e60, field, value,
-                    "must be between 1e-60 and 1e60: use another unit");
+      rules.demand((std::abs)(value) >= 1e-60 && (std::abs)(value) <= 1e60, field, value,
+                   "must be between 1e-60 and 1e60: use another unit");
     };
     const auto lag_fits = [&](const char* field, double value) {
-      rules.require(!(value > 0.0) || (value >= 1e-9 * sample_time && value <= 1e6 * sample_time),
-                    field, value, "must be 0, or between 1e-9 and 1e6 samples");
+      rules.demand(!(value > 0.0) || (value >= 1e-9 * sample_time && value <= 1e6 * sample_time),
+                   field, value, "must be 0, or between 1e-9 and 1e6 samples");
     };
-    rules
-        .require(order >= 1 && order <= 3, "order", static_cast<double>(order), "must be 1, 2 or 3")
+    rules.demand(order >= 1 && order <= 3, "order", static_cast<double>(order), "must be 1, 2 or 3")
         .nonzero("input_gain", input_gain.value)
         .not_negative("input_gain.half_width", input_gain.half_width)
-        .require(!(input_gain.half_width >= std::abs(input_gain.value)), "input_gain.half_width",
-                 input_gain.half_width, "must be below b0: the sign of b0 has to be known")
-        .require(is_finite(pole), "pole", pole, "must be finite")
+        .demand(!(input_gain.half_width >= (std::abs)(input_gain.value)), "input_gain.half_width",
+                input_gain.half_width, "must be below b0: the sign of b0 has to be known")
+        .demand(is_finite(pole), "pole", pole, "must be finite")
         .not_negative("lag", lag)
         .not_negative("dead_time", dead_time)
         .not_negative("latency_half_width", latency_half_width)
@@ -99,42 +98,42 @@ struct TuneModel {
         .positive("noise", noise)
         .positive("disturbance", disturbance)
         .positive("sample_time", sample_time)
-        .require(is_finite(u_min), "u_min", u_min, "must be finite")
-        .require(is_finite(u_max), "u_max", u_max, "must be finite")
-        .require(u_min < u_max, "u_max", u_max, "must be above u_min")
-        .require(sinusoids.size() <= 1, "sinusoids", static_cast<double>(sinusoids.size()),
-                 "must be one at most")
-        .require(!(dead_time > 100.0 * sample_time), "dead_time", dead_time,
-                 "must not be above 100 samples")
-        .require(!(latency_half_width > 100.0 * sample_time), "latency_half_width",
-                 latency_half_width, "must not be above 100 samples")
-        .require(sample_time >= 1e-12 && sample_time <= 1e12, "sample_time", sample_time,
-                 "must be between 1e-12 s and 1e12 s")
-        .require(!(std::abs(pole) * sample_time > 100.0), "pole", pole,
-                 "must be at most a hundred times the sample rate")
-        .require(std::abs(u_min) <= 1e60, "u_min", u_min, "is too large: use another unit")
-        .require(std::abs(u_max) <= 1e60, "u_max", u_max, "is too large: use another unit");
+        .demand(is_finite(u_min), "u_min", u_min, "must be finite")
+        .demand(is_finite(u_max), "u_max", u_max, "must be finite")
+        .demand(u_min < u_max, "u_max", u_max, "must be above u_min")
+        .demand(sinusoids.size() <= 1, "sinusoids", static_cast<double>(sinusoids.size()),
+                "must be one at most")
+        .demand(!(dead_time > 100.0 * sample_time), "dead_time", dead_time,
+                "must not be above 100 samples")
+        .demand(!(latency_half_width > 100.0 * sample_time), "latency_half_width",
+                latency_half_width, "must not be above 100 samples")
+        .demand(sample_time >= 1e-12 && sample_time <= 1e12, "sample_time", sample_time,
+                "must be between 1e-12 s and 1e12 s")
+        .demand(!((std::abs)(pole)*sample_time > 100.0), "pole", pole,
+                "must be at most a hundred times the sample rate")
+        .demand((std::abs)(u_min) <= 1e60, "u_min", u_min, "is too large: use another unit")
+        .demand((std::abs)(u_max) <= 1e60, "u_max", u_max, "is too large: use another unit");
     // For order 3 the computed LQG controller is wrong beyond this.
-    rules.require(std::abs(input_gain.value) >= 1e-20 && std::abs(input_gain.value) <= 1e20,
-                  "input_gain", input_gain.value,
-                  "must be between 1e-20 and 1e20: use another unit");
+    rules.demand((std::abs)(input_gain.value) >= 1e-20 && (std::abs)(input_gain.value) <= 1e20,
+                 "input_gain", input_gain.value,
+                 "must be between 1e-20 and 1e20: use another unit");
     size_fits("noise", noise);
     size_fits("disturbance", disturbance);
     lag_fits("lag", lag);
     lag_fits("sensor", sensor);
     // Beyond this limit the criterion is a difference of numbers that agree to the last digit.
-    rules.require(filter_bandwidth() * sample_time >= 1e-6, "disturbance", disturbance,
-                  "is so small for this noise that an observer would need a million samples");
+    rules.demand(filter_bandwidth() * sample_time >= 1e-6, "disturbance", disturbance,
+                 "is so small for this noise that an observer would need a million samples");
     for (std::size_t i = 0; i < sinusoids.size(); ++i) {
       const int index = static_cast<int>(i);
       rules.positive("sinusoids.frequency", sinusoids[i].frequency, index)
-          .require(sinusoids[i].frequency * sample_time < 3.1, "sinusoids.frequency",
-                   sinusoids[i].frequency, "must be below half the sample rate", index)
-          .require(sinusoids[i].frequency * sample_time >= 1e-9, "sinusoids.frequency",
-                   sinusoids[i].frequency, "must be at least 1e-9 of the sample rate", index)
+          .demand(sinusoids[i].frequency * sample_time < 3.1, "sinusoids.frequency",
+                  sinusoids[i].frequency, "must be below half the sample rate", index)
+          .demand(sinusoids[i].frequency * sample_time >= 1e-9, "sinusoids.frequency",
+                  sinusoids[i].frequency, "must be at least 1e-9 of the sample rate", index)
           .not_negative("sinusoids.amplitude", sinusoids[i].amplitude, index)
-          .require(!(sinusoids[i].amplitude > 1e60), "sinusoids.amplitude", sinusoids[i].amplitude,
-                   "is too large: use another unit", index)
+          .demand(!(sinusoids[i].amplitude > 1e60), "sinusoids.amplitude", sinusoids[i].amplitude,
+                  "is too large: use another unit", index)
           .not_negative("sinusoids.capture_bandwidth", sinusoids[i].capture_bandwidth, index);
     }
     return rules;
@@ -264,7 +263,7 @@ struct PlantVariant {
 };
 inline std::vector<PlantVariant> plant_variants(const TuneModel& model) {
   std::vector<PlantVariant> variants;
-  const double share = model.input_gain.half_width / std::abs(model.input_gain.value);
+  const double share = model.input_gain.half_width / (std::abs)(model.input_gain.value);
   const double more = model.latency_half_width;
   if (!(share > 0.0) && !(more > 0.0) && !(model.lag_half_width > 0.0)) return variants;
   TuneModel late = model;
@@ -289,7 +288,7 @@ inline std::vector<PlantVariant> plant_variants(const TuneModel& model) {
 /// @param gain factor on b0 of the plant, not of the controller
 inline LoopResult closed_loop(const TuneModel& model, const LinearController& controller,
                               double gain = 1.0) {
-  if (auto ok = model.check(); !ok) return ok.error();
+  if (auto ok = model.validate(); !ok) return ok.error();
   return Loop::make(detail::dense_plant(model, gain), controller);
 }
 

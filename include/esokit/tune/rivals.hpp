@@ -111,7 +111,7 @@ struct RivalSearch {
         coarse(search.coarse()),
         fine(of.model, of.rules, search.slowest(), 50.0) {
     const TuneModel& model = of.model;
-    gain = 1.0 / std::abs(model.input_gain.value);
+    gain = 1.0 / (std::abs)(model.input_gain.value);
     power = model.order;
     if (model.order == 3 && model.pole > 0.0) {
       gain *= model.pole;
@@ -150,7 +150,7 @@ struct RivalSearch {
     const std::array<double, 5> high{fast + 1.0, fast, fast + 5.0, fast + 2.0, std::log(30.0)};
     double outside = 0.0;
     for (std::size_t i = 0; i < x.size(); ++i)
-      outside += std::max(low[i] - x[i], 0.0) + std::max(x[i] - high[i], 0.0);
+      outside += (std::max)(low[i] - x[i], 0.0) + (std::max)(x[i] - high[i], 0.0);
     if (outside > 0.0) return 1e4 * (1.0 + outside);
     const LoopNumbers numbers = (*cost)(closed_upon_itself(pid_form(settings(kind, x))));
     const double j = numbers.cost(search.rho, tuning->model.input_gain.value);
@@ -171,10 +171,10 @@ struct RivalSearch {
     const double T = tuning->model.sample_time;
     auto poles = poles_of(c.a);
     std::sort(poles.begin(), poles.end(),
-              [](const auto& a, const auto& b) { return std::abs(a) < std::abs(b); });
+              [](const auto& a, const auto& b) { return (std::abs)(a) < (std::abs)(b); });
     // The integrator first.
     const std::complex<double> p = std::log(1.0 + poles[1]) / T, q = std::log(1.0 + poles[2]) / T;
-    const double w = std::sqrt(std::abs(p * q)), damping = -0.5 * (p + q).real() / w;
+    const double w = std::sqrt((std::abs)(p * q)), damping = -0.5 * (p + q).real() / w;
     PlainPidConfig pid;
     pid.sample_time = T;
     pid.filter_frequency = w;
@@ -211,7 +211,7 @@ struct RivalSearch {
       all.push_back({j, std::move(x)});
     };
     for (const auto& x : more) take(x);
-    const double w0 = std::min(search.reference_bandwidth, search.possible_bandwidth);
+    const double w0 = (std::min)(search.reference_bandwidth, search.possible_bandwidth);
     for (const double share : {0.125, 0.25, 0.5, 1.0, 2.0}) {
       for (const double of_integral : {1.5, 4.0, 12.0}) {
         for (const double of_derivative : {0.6, 1.2, 8.0}) {
@@ -232,7 +232,8 @@ struct RivalSearch {
       // Designs that equal each other are one start.
       const auto same = [&](const std::vector<double>& x) {
         double apart = 0.0;
-        for (std::size_t i = 0; i < n; ++i) apart = std::max(apart, std::abs(x[i] - point.at[i]));
+        for (std::size_t i = 0; i < n; ++i)
+          apart = (std::max)(apart, (std::abs)(x[i] - point.at[i]));
         return apart < 0.1;
       };
       if (best.size() < 2 && std::none_of(best.begin(), best.end(), same)) best.push_back(point.at);
@@ -311,7 +312,7 @@ inline void judge(TunedRival& rival, const TuneSearch& search, const LoopCost& f
   if (chosen) times = td > 0.0 ? std::vector{std::sqrt(ti * td), ti, td} : std::vector{ti};
   const auto formed = [&](double weight, double time) {
     rival.pid.reference_weight = weight;
-    rival.pid.tracking_time = time > 0.0 ? std::max(printed(time), model.sample_time) : 0.0;
+    rival.pid.tracking_time = time > 0.0 ? (std::max)(printed(time), model.sample_time) : 0.0;
     d.controller = pid_form(rival.pid);
   };
   formed(rival.pid.reference_weight, times[0]);
@@ -416,8 +417,8 @@ template <class = void>
   pid.upper = tuning.model.u_max;
   pid.sample_time = tuning.model.sample_time;
   Rules<double> rules;
-  rules.all_of(pid.check())
-      .require(!tuning.designs.empty(), "tuning.designs", 0.0, "must not be empty");
+  rules.all_of(pid.validate())
+      .demand(!tuning.designs.empty(), "tuning.designs", 0.0, "must not be empty");
   if (!rules) return rules.error();
   TunedRival rival;
   rival.kind = RivalKind::given;
@@ -456,7 +457,7 @@ template <class = void>
                            double unit, const char* unit_name) {
     const std::string text = std::string(what) + ": " + number(unit * now) + unit_name +
                              " instead of " + number(unit * was) + unit_name;
-    const bool tie = std::abs(now - was) <= 0.01 * std::max(std::abs(now), std::abs(was));
+    const bool tie = (std::abs)(now - was) <= 0.01 * (std::max)((std::abs)(now), (std::abs)(was));
     (tie ? found.ties : (now > was) == more_is_better ? found.gains : found.losses).push_back(text);
   };
   const double range = tuning.model.u_max - tuning.model.u_min;

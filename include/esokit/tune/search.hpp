@@ -52,7 +52,7 @@ SearchPoint simplex_search(const Function& f, const std::vector<double>& start,
     std::sort(s.begin(), s.end(), less);
     double extent = 0.0;
     for (std::size_t j = 0; j < n; ++j)
-      extent = std::max(extent, std::abs(s[n].at[j] - s[0].at[j]));
+      extent = (std::max)(extent, (std::abs)(s[n].at[j] - s[0].at[j]));
     if (s[n].value - s[0].value < tolerance && extent < 1e-2) break;
     auto mirrored = along(1.0);
     if (less(mirrored, s[0])) {
@@ -111,13 +111,13 @@ std::vector<SearchPoint> grid_search(const Function& f, const std::vector<double
   std::vector<SearchPoint> best;
   std::vector<const Node*> taken;
   for (const Node& node : nodes) {
-    const auto near = [&](const Node* other) {
+    const auto close = [&](const Node* other) {
       for (std::size_t j = 0; j < node.index.size(); ++j) {
-        if (std::abs(node.index[j] - other->index[j]) > 1) return false;
+        if ((std::abs)(node.index[j] - other->index[j]) > 1) return false;
       }
       return true;
     };
-    if (std::any_of(taken.begin(), taken.end(), near)) continue;
+    if (std::any_of(taken.begin(), taken.end(), close)) continue;
     taken.push_back(&node);
     best.push_back({node.value, place(node.index)});
     if (best.size() == count) break;

@@ -61,8 +61,8 @@ inline StepAnswer step_answer(const DynamicSystem& system, int input, double siz
   for (int k = 0; k <= steps; ++k) {
     double y = system.d(0, input) * size;
     for (int j = 0; j < n; ++j) y += system.c(0, j) * x[static_cast<std::size_t>(j)];
-    answer.peak = std::max(answer.peak, std::abs(y));
-    if (std::abs(y - final) > 0.02 * std::abs(final))
+    answer.peak = (std::max)(answer.peak, (std::abs)(y));
+    if ((std::abs)(y - final) > 0.02 * (std::abs)(final))
       answer.settling = (k + 1) * system.sample_time;
     for (int i = 0; i < n; ++i) rate[static_cast<std::size_t>(i)] = system.b(i, input) * size;
     for (int j = 0; j < n; ++j) {
@@ -150,7 +150,7 @@ inline void fill_in_loop(TunedDesign& d, const TuneSearch& search, const LoopNum
   const TuneModel& model = search.model;
   d.cost = numbers.cost(search.rho, model.input_gain.value);
   d.excess = std::sqrt(d.cost / optimum);
-  d.free_excess = std::min(std::sqrt(free_cost / optimum), d.excess);
+  d.free_excess = (std::min)(std::sqrt(free_cost / optimum), d.excess);
   d.output_deviation = numbers.output;
   d.control_deviation = numbers.control;
   d.control_noise = numbers.control_noise;
@@ -184,10 +184,10 @@ inline void fill_in_loop(TunedDesign& d, const TuneSearch& search, const LoopNum
     d.constraint = "stability";
     return;
   }
-  const double decay = -std::log1p(std::max(loop->stability_abscissa(), -0.9));
-  const int steps = static_cast<int>(std::min(12.0 / decay, 50000.0)) + 10;
+  const double decay = -std::log1p((std::max)(loop->stability_abscissa(), -0.9));
+  const int steps = static_cast<int>((std::min)(12.0 / decay, 50000.0)) + 10;
   d.settling_time = step_answer(loop->system(), 0, 1.0, 1.0, steps).settling;
-  d.load_peak = step_answer(loop->system(), 2, std::abs(model.input_gain.value), 0.0, steps).peak;
+  d.load_peak = step_answer(loop->system(), 2, (std::abs)(model.input_gain.value), 0.0, steps).peak;
 }
 
 /// Computes the results of a design from its settings.
@@ -309,14 +309,16 @@ std::vector<Contender> contenders(const TuneModel& model, bool law_is_given) {
       if (sinusoid) both(Q{}, "the sine", {.sinusoid = true});
     }
     if constexpr (Parts.lag && Parts.sensor) {
-      using LF = std::integral_constant<ModelParts,
-                                        ModelParts{.order = order, .actuator = 1, .sensor = 1}>;
-      if (lag && sensor) both(LF{}, "lag and sensor", {.lag = true, .sensor = true});
+      using LagAndSensor =
+          std::integral_constant<ModelParts,
+                                 ModelParts{.order = order, .actuator = 1, .sensor = 1}>;
+      if (lag && sensor) both(LagAndSensor{}, "lag and sensor", {.lag = true, .sensor = true});
     }
     if constexpr (Parts.lag && Parts.sinusoid) {
-      using LQ = std::integral_constant<ModelParts,
-                                        ModelParts{.order = order, .actuator = 1, .resonators = 1}>;
-      if (lag && sinusoid) both(LQ{}, "lag and sine", {.lag = true, .sinusoid = true});
+      using LagAndSine =
+          std::integral_constant<ModelParts,
+                                 ModelParts{.order = order, .actuator = 1, .resonators = 1}>;
+      if (lag && sinusoid) both(LagAndSine{}, "lag and sine", {.lag = true, .sinusoid = true});
     }
     return 0;
   });
@@ -338,45 +340,45 @@ double bandwidth_for(const Function& rises, double wanted, double low, double hi
 
 /// Finds designs for a model, the best one first.
 /// @tparam Parts what a model may have that an observer could know: the fewer, the less is compiled
-/// @return error for a model that `check` refuses or with other parts, more than one requirement,
-/// or a requirement that
+/// @return error for a model that `validate` refuses or with other parts, more than one
+/// requirement, or a requirement that
 ///         no controller can meet
 template <TuneKnowledge Parts = tune_knows_all>
 [[nodiscard]] Expected<Tuning, Error<double>> tune(const TuneModel& given,
                                                    const TuneWish& wish = {},
                                                    const TuneRules& rules = {}) {
   Rules<double> checks;
-  checks.all_of(given.check())
-      .require(Parts.lag || !(given.lag > 0.0), "lag", given.lag,
-               "is not among the parts that this tune is compiled for")
-      .require(Parts.sensor || !(given.sensor > 0.0), "sensor", given.sensor,
-               "is not among the parts that this tune is compiled for")
-      .require(Parts.sinusoid || given.sinusoids.empty(), "sinusoids",
-               static_cast<double>(given.sinusoids.size()),
-               "are not among the parts that this tune is compiled for")
+  checks.all_of(given.validate())
+      .demand(Parts.lag || !(given.lag > 0.0), "lag", given.lag,
+              "is not among the parts that this tune is compiled for")
+      .demand(Parts.sensor || !(given.sensor > 0.0), "sensor", given.sensor,
+              "is not among the parts that this tune is compiled for")
+      .demand(Parts.sinusoid || given.sinusoids.empty(), "sinusoids",
+              static_cast<double>(given.sinusoids.size()),
+              "are not among the parts that this tune is compiled for")
       .not_negative("control_noise", wish.control_noise)
       .not_negative("settling_time", wish.settling_time)
       .not_negative("controller_bandwidth", wish.controller_bandwidth)
-      .require(!(wish.settling_time > 0.0 && wish.control_noise > 0.0), "settling_time",
-               wish.settling_time, "must be left out if control_noise is given")
-      .require(!(wish.controller_bandwidth > 0.0 &&
-                 (wish.control_noise > 0.0 || wish.settling_time > 0.0)),
-               "controller_bandwidth", wish.controller_bandwidth,
-               "must be left out if control_noise or settling_time is given")
+      .demand(!(wish.settling_time > 0.0 && wish.control_noise > 0.0), "settling_time",
+              wish.settling_time, "must be left out if control_noise is given")
+      .demand(!(wish.controller_bandwidth > 0.0 &&
+                (wish.control_noise > 0.0 || wish.settling_time > 0.0)),
+              "controller_bandwidth", wish.controller_bandwidth,
+              "must be left out if control_noise or settling_time is given")
       .not_negative("modulus_margin", rules.modulus_margin)
-      .require(!(rules.modulus_margin >= 1.0), "modulus_margin", rules.modulus_margin,
-               "must be below 1")
+      .demand(!(rules.modulus_margin >= 1.0), "modulus_margin", rules.modulus_margin,
+              "must be below 1")
       .not_negative("delay_samples", rules.delay_samples)
-      .require(rules.gain_factor >= 1.0 && is_finite(rules.gain_factor), "gain_factor",
-               rules.gain_factor, "must be finite and 1 or more")
+      .demand(rules.gain_factor >= 1.0 && is_finite(rules.gain_factor), "gain_factor",
+              rules.gain_factor, "must be finite and 1 or more")
       .not_negative("phase_margin", rules.phase_margin)
-      .require(!(rules.phase_margin >= 1.5), "phase_margin", rules.phase_margin,
-               "must be below 1.5 rad")
+      .demand(!(rules.phase_margin >= 1.5), "phase_margin", rules.phase_margin,
+              "must be below 1.5 rad")
       .not_negative("damping_latencies", rules.damping_latencies)
       .not_negative("bandwidth_ratio", rules.bandwidth_ratio)
       .not_negative("filter_floor", rules.filter_floor.value_or(0.0))
-      .require(!(rules.filter_floor.value_or(0.0) > 1.0), "filter_floor",
-               rules.filter_floor.value_or(0.0), "must not be above 1");
+      .demand(!(rules.filter_floor.value_or(0.0) > 1.0), "filter_floor",
+              rules.filter_floor.value_or(0.0), "must not be above 1");
   if (!checks) return checks.error();
   const int n = given.order;
   const double T = given.sample_time;
@@ -388,7 +390,7 @@ template <TuneKnowledge Parts = tune_knows_all>
   const double fast = 0.5 / T;
   const auto rho_of = [n](double x) { return std::pow(x, -2 * n); };
   const auto slowest_of = [&](const TuneModel& of) {
-    return std::min(1e-3 * of.filter_bandwidth(), 1e-2 / T);
+    return (std::min)(1e-3 * of.filter_bandwidth(), 1e-2 / T);
   };
   const auto least_noise = [&](const TuneModel& of) {
     const double slow = slowest_of(of);
@@ -437,37 +439,37 @@ template <TuneKnowledge Parts = tune_knows_all>
   if (wish.controller_bandwidth > 0.0) {
     w = wish.controller_bandwidth;
     checks
-        .require(w <= fast, {"controller_bandwidth", w,
-                             "must not be above half the sample rate, which is", -1, fast, true})
-        .require(w * T >= 1e-6, "controller_bandwidth", w,
-                 "must be at least 1e-6 of the sample rate")
-        .require(w <= 2.0 * damped,
-                 {"controller_bandwidth", w,
-                  "is so fast for this latency that the loop would swing at its limits for ever; "
-                  "must be at most",
-                  -1, 2.0 * damped, true});
+        .demand(w <= fast, {"controller_bandwidth", w,
+                            "must not be above half the sample rate, which is", -1, fast, true})
+        .demand(w * T >= 1e-6, "controller_bandwidth", w,
+                "must be at least 1e-6 of the sample rate")
+        .demand(w <= 2.0 * damped,
+                {"controller_bandwidth", w,
+                 "is so fast for this latency that the loop would swing at its limits for ever; "
+                 "must be at most",
+                 -1, 2.0 * damped, true});
   } else if (wish.settling_time > 0.0) {
     // Of n equal poles w, after the time that u and y need.
     const auto shortest = [&](double x) { return delay + settled / x; };
-    const double safe = std::min(fast, 2.0 * damped);
+    const double safe = (std::min)(fast, 2.0 * damped);
     checks
-        .require(
+        .demand(
             shortest(fast) <= wish.settling_time,
             {"settling_time", wish.settling_time,
              "is shorter than sample time and dead time allow, which is", -1, shortest(fast), true})
-        .require(shortest(safe) <= wish.settling_time,
-                 {"settling_time", wish.settling_time,
-                  "is so short for this latency that the loop would swing at its limits for ever; "
-                  "must be at least",
-                  -1, shortest(safe), true})
-        .require(shortest(slow) >= wish.settling_time,
-                 {"settling_time", wish.settling_time,
-                  "is far slower than the disturbance; must be at most", -1, shortest(slow), true});
+        .demand(shortest(safe) <= wish.settling_time,
+                {"settling_time", wish.settling_time,
+                 "is so short for this latency that the loop would swing at its limits for ever; "
+                 "must be at least",
+                 -1, shortest(safe), true})
+        .demand(shortest(slow) >= wish.settling_time,
+                {"settling_time", wish.settling_time,
+                 "is far slower than the disturbance; must be at most", -1, shortest(slow), true});
     if (!checks) return checks.error();
     tuning.settling_time = wish.settling_time;
     w = settled / (wish.settling_time - delay);
   } else {
-    checks.require(
+    checks.demand(
         wanted > 1.001 * tuning.least_noise,
         {"control_noise", wanted, "is less than needed to cancel the disturbance alone, which is",
          -1, tuning.least_noise, true});
@@ -493,9 +495,9 @@ template <TuneKnowledge Parts = tune_knows_all>
     walking.sinusoids.clear();
     tuning.lqg = LoopCost(walking, rules, search.slowest(), 50.0)(lqg.controller(tuning.rho));
     tuning.optimum = tuning.lqg.cost(tuning.rho, b0);
-    checks.require(tuning.lqg.stable && tuning.optimum > 0.0 && is_finite(tuning.optimum),
-                   "optimum", tuning.optimum,
-                   "cannot be computed: the numbers of this model are too far apart");
+    checks.demand(tuning.lqg.stable && tuning.optimum > 0.0 && is_finite(tuning.optimum), "optimum",
+                  tuning.optimum,
+                  "cannot be computed: the numbers of this model are too far apart");
     if (!checks) return checks.error();
     std::vector<detail::Contender> all = detail::contenders<Parts>(model, given_law);
     for (detail::Contender& c : all) {
@@ -558,12 +560,12 @@ template <TuneKnowledge Parts = tune_knows_all>
     }
     const TunedDesign* chosen = tuning.chosen();
     if (!(wish.settling_time > 0.0) || chosen == nullptr || corrections == (given_law ? 4 : 2) ||
-        std::abs(chosen->settling_time - wish.settling_time) <=
-            std::max(0.02 * wish.settling_time, T)) {
+        (std::abs)(chosen->settling_time - wish.settling_time) <=
+            (std::max)(0.02 * wish.settling_time, T)) {
       break;
     }
     w = std::clamp(w * chosen->settling_time / wish.settling_time, slow,
-                   std::min(fast, 2.0 * damped));
+                   (std::min)(fast, 2.0 * damped));
   }
   for (TunedDesign& design : tuning.designs) {
     design.code = detail::controller_source(design, model).text(model);

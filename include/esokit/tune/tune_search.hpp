@@ -53,10 +53,11 @@ struct TuneSearch {
   static constexpr double worth_of_speed = 0.003;
 
   [[nodiscard]] double slowest() const {
-    return 0.05 * std::min({reference_bandwidth, filter_bandwidth, 0.3 * possible_bandwidth});
+    return 0.05 * (std::min)({reference_bandwidth, filter_bandwidth, 0.3 * possible_bandwidth});
   }
   [[nodiscard]] double fastest() const {
-    return std::min(8.0 * std::max(reference_bandwidth, filter_bandwidth), 3.0 / model.sample_time);
+    return (std::min)(8.0 * (std::max)(reference_bandwidth, filter_bandwidth),
+                      3.0 / model.sample_time);
   }
 
   /// Settings from the logarithms over which the search runs.
@@ -144,8 +145,8 @@ struct TuneSearch {
     constexpr double any = std::numeric_limits<double>::infinity();
     return {over(numbers.modulus, rules.modulus_margin),
             over(numbers.delay, rules.delay_samples * model.sample_time),
-            numbers.tolerant ? std::max(numbers.tolerance / rules.gain_factor, 1.0)
-                             : std::min(numbers.tolerance / rules.gain_factor, 0.98),
+            numbers.tolerant ? (std::max)(numbers.tolerance / rules.gain_factor, 1.0)
+                             : (std::min)(numbers.tolerance / rules.gain_factor, 0.98),
             over(numbers.phase, rules.phase_margin),
             most_noise > 0.0 ? most_noise / numbers.control_noise : any,
             any,
@@ -165,10 +166,10 @@ struct TuneSearch {
   }
   /// How much is missing: the sum of shares, 0 if nothing is.
   [[nodiscard]] static double lack(const Kept& kept, double more = 1.0) {
-    double sum = std::max(1.0 - kept.gain, 0.0);
+    double sum = (std::max)(1.0 - kept.gain, 0.0);
     for (const double share :
          {kept.modulus, kept.delay, kept.phase, kept.noise, kept.damping, kept.ratio}) {
-      sum += std::max(1.0 - share / more, 0.0);
+      sum += (std::max)(1.0 - share / more, 0.0);
     }
     return sum;
   }
@@ -177,7 +178,7 @@ struct TuneSearch {
   [[nodiscard]] double value(const Contender& c, const std::vector<double>& x, double price) const {
     double outside = 0.0;
     for (std::size_t i = 0; i < x.size(); ++i) {
-      outside += std::max(low(c, i) - x[i], 0.0) + std::max(x[i] - high(c, i), 0.0);
+      outside += (std::max)(low(c, i) - x[i], 0.0) + (std::max)(x[i] - high(c, i), 0.0);
     }
     if (outside > 0.0) return 1e4 * (1.0 + outside);
     // The search with rules comes back to the points of that without.
@@ -208,7 +209,7 @@ struct TuneSearch {
   [[nodiscard]] static bool runs_away(const LinearController& controller) {
     const auto poles = poles_of(controller.a);
     return std::any_of(poles.begin(), poles.end(),
-                       [](const auto& pole) { return std::abs(1.0 + pole) > 1.0 + 1e-7; });
+                       [](const auto& pole) { return (std::abs)(1.0 + pole) > 1.0 + 1e-7; });
   }
 
   /// What a point lacks of the rules, by this cost.
@@ -256,7 +257,7 @@ struct TuneSearch {
       // With a lag the law has one more pole, that of the lag.
       if (!of_observer && half && c.design.knows.lag && static_cast<int>(i) == c.observer_numbers &&
           c.kind.order % 2 != 0) {
-        value = std::max(value, -std::log(model.lag));
+        value = (std::max)(value, -std::log(model.lag));
       }
       x.push_back(std::clamp(value, low(c, i), high(c, i)));
     }
@@ -308,8 +309,8 @@ struct TuneSearch {
           found.push_back(std::log(0.5 * (own[i] + own[i + 1]) / w));
         }
         for (const auto& pole : twos) {
-          found.push_back(std::log(std::abs(pole)));
-          found.push_back(std::log(-pole.real() / std::abs(pole)));
+          found.push_back(std::log((std::abs)(pole)));
+          found.push_back(std::log(-pole.real() / (std::abs)(pole)));
         }
       }
       if (found.size() != x.size()) continue;
