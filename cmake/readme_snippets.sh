@@ -41,7 +41,7 @@ END
 }
 
 try() {  # try SOURCE NAME
-  if "$compiler" -std=c++20 -fsyntax-only -Iinclude "-I$(dirname -- "$2")" -isystem "$eigen" "$1" 2>"$work/errors"; then
+  if "$compiler" -std=c++20 -fsyntax-only -Iinclude -Iexamples "-I$(dirname -- "$2")" -isystem "$eigen" "$1" 2>"$work/errors"; then
     passed=$((passed + 1))
   else
     failed=$((failed + 1))

@@ -77,7 +77,7 @@ Criteria run_deployed(double bandwidth, double sample_time, double power, std::u
              const double total = r[2] - plant.acceleration(sample.t, sample.plant_state, held) +
                                   nominal_gain * held;
              meter.add(sample.t, r[0], sample.output, sample.measurement, sample.input,
-                       total - sample.estimate(2));
+                       r[0] - sample.output - sample.estimate(0), total - sample.estimate(2));
              held = sample.input;
            })
       .value();
@@ -170,7 +170,7 @@ int main(int argc, char** argv) {
   };
   report.remark(
       "With p = 1 at 10 ms int |z3 error| dt is smaller than in the continuous simulation, "
-      "although e is larger: the error of the estimate is smaller nearly all the time (the largest "
+      "although e is larger. The error of the estimate is smaller nearly all the time (the largest "
       "in the sine after 3.6 s " +
       shown_text(largest_after(runs[0][1])) + " instead of " +
       shown_text(largest_after(runs[0][0])) +

@@ -1,6 +1,6 @@
 /// @file
-/// What the examples of this paper share: its name, Table 1's plant and observers, and the runs of
-/// the generic example.
+/// What the examples of this paper share: its name, Table 1's plant and observers, the runs of the
+/// generic example, with these observers or with yours, and its figure.
 ///
 /// K. Lakomy, R. Madonski, "Cascade extended state observer for active disturbance rejection
 /// control applications under measurement noise", ISA Transactions 109 (2021) 1-10,
@@ -153,7 +153,15 @@ struct Criteria {
 
 /// The signals of Figs 3 and 4.
 struct Series {
-  std::vector<double> t, reference, output, error, control, estimate_error;
+  std::vector<double> t, reference, output, error, control;
+  std::vector<double> output_estimate_error;  ///< z1 error
+  std::vector<double> estimate_error;         ///< z3 error
+};
+
+/// A curve of Figs 3 and 4.
+struct NamedSeries {
+  std::string name;
+  Series series;
 };
 
 /// Adds up the criteria over a run, and keeps the signals if asked to.
@@ -161,7 +169,8 @@ class Meter {
  public:
   explicit Meter(Series* series = nullptr) : series_(series) {}
 
-  void add(double t, double y_d, double y, double measured_error, double u, double z3_error) {
+  void add(double t, double y_d, double y, double measured_error, double u, double z1_error,
+           double z3_error) {
     error_.add(t, std::abs(measured_error));
     control_.add(t, u * u);
     estimate_.add(t, std::abs(z3_error));
@@ -171,6 +180,7 @@ class Meter {
     series_->output.push_back(y);
     series_->error.push_back(measured_error);
     series_->control.push_back(u);
+    series_->output_estimate_error.push_back(z1_error);
     series_->estimate_error.push_back(z3_error);
   }
 
@@ -181,21 +191,18 @@ class Meter {
   sim::Trapezoid<> error_, control_, estimate_;
 };
 
-/// One run of Sim1 as a continuous simulation with a cascade of `Levels` levels, the first one at
-/// `bandwidth`.
-template <int Levels>
-Criteria run_generic(double bandwidth, double power, std::uint64_t seed, const Setup& setup = {},
-                     Series* series = nullptr, double step = 1e-3) {
+/// One run of Sim1 as a continuous simulation, with any observer of order 2 with one extended
+/// state: one of esokit/sim/continuous_observer.hpp, or a class of your own with the members that
+/// ContinuousObserverModel names. Unless the set-up says otherwise it is driven by y_d - y, so its
+/// input gain is -nominal_gain.
+template <sim::ContinuousObserverModel Observer>
+Criteria run_generic(const Observer& observer, double power, std::uint64_t seed,
+                     const Setup& setup = {}, Series* series = nullptr, double step = 1e-3) {
   const GenericPlant plant(setup.disturbance);
   const auto y_d = reference(setup.step_time);
   const auto law =
       esokit::AdrcLaw<2>::make({.controller_bandwidth = 2.0, .input_gain = nominal_gain})
           .value();  // gains 4, 4
-  typename esokit::ContinuousCascadeEso<2, Levels>::Config config{
-      .observer_bandwidth = bandwidth,
-      .input_gain = setup.error_based ? -nominal_gain : nominal_gain};
-  if (Levels > 1) config.bandwidth_factor = level_factor;
-  const auto observer = esokit::ContinuousCascadeEso<2, Levels>::make(config).value();
   const auto noise = measurement_noise(power, step, seed);
 
   Meter meter(series);
@@ -206,7 +213,9 @@ Criteria run_generic(double bandwidth, double power, std::uint64_t seed, const S
     const double total = setup.error_based ? r[2] - acceleration + nominal_gain * sample.input
                                            : acceleration - nominal_gain * sample.input;
     const double error = setup.error_based ? sample.measurement : r[0] - sample.measurement;
-    meter.add(sample.t, r[0], sample.output, error, sample.input, total - sample.estimate(2));
+    const double first = setup.error_based ? r[0] - sample.output : sample.output;
+    meter.add(sample.t, r[0], sample.output, error, sample.input, first - sample.estimate(0),
+              total - sample.estimate(2));
   };
   if (setup.error_based) {
     const sim::ContinuousLoop loop{
@@ -227,12 +236,77 @@ Criteria run_generic(double bandwidth, double power, std::uint64_t seed, const S
   return meter.criteria();
 }
 
+/// The same with a cascade of `Levels` levels, the first one at `bandwidth`.
+template <int Levels>
+Criteria run_generic(double bandwidth, double power, std::uint64_t seed, const Setup& setup = {},
+                     Series* series = nullptr, double step = 1e-3) {
+  typename esokit::ContinuousCascadeEso<2, Levels>::Config config{
+      .observer_bandwidth = bandwidth,
+      .input_gain = setup.error_based ? -nominal_gain : nominal_gain};
+  if (Levels > 1) config.bandwidth_factor = level_factor;
+  const auto observer = esokit::ContinuousCascadeEso<2, Levels>::make(config).value();
+  return run_generic(observer, power, seed, setup, series, step);
+}
+
 /// The same with the number of levels chosen at run time, 1 to 3.
 inline Criteria run_generic(int levels, double bandwidth, double power, std::uint64_t seed,
                             const Setup& setup = {}, Series* series = nullptr, double step = 1e-3) {
   if (levels == 1) return run_generic<1>(bandwidth, power, seed, setup, series, step);
   if (levels == 2) return run_generic<2>(bandwidth, power, seed, setup, series, step);
   return run_generic<3>(bandwidth, power, seed, setup, series, step);
+}
+
+/// The curves of Fig 3 (power 0) or Fig 4 (noise_power, seed 1): p = 1, 2, 3 at Table 1.
+inline std::vector<NamedSeries> paper_runs(double power) {
+  std::vector<NamedSeries> runs;
+  for (std::size_t p = 0; p < 3; ++p) {
+    runs.push_back({level_names[p], {}});
+    (void)run_generic(static_cast<int>(p) + 1, table1[p], power, 1, {}, &runs.back().series);
+  }
+  return runs;
+}
+
+/// Figs 3 and 4: output, tracking error, errors of the first and the last estimate, control.
+inline esokit::examples::Figure draw(const std::string& name, const std::string& caption,
+                                     const std::vector<NamedSeries>& runs, bool noisy) {
+  using namespace esokit::examples;
+  Figure figure(name, {.rows = 3, .columns = 2, .panel_height = 190});
+  figure.caption(caption);
+  auto& output = figure.panel(0, 0).y_label("y_d, y (-)").name("output");
+  auto& error = figure.panel(0, 1).y_label("e = y_d − y (-)").name("error");
+  auto& first = figure.panel(1, 0).y_label("z_1 error (-)").name("output_estimate_error");
+  auto& estimate = figure.panel(1, 1).y_label("z_3 error (-)").name("disturbance_error");
+  auto& control = figure.panel(2, 0, 1, 2).y_label("u (-)").name("control");
+  output.line(runs.front().series.t, runs.front().series.reference,
+              {.name = "y_d", .color = Color::black, .dash = Dash::dashed});
+  constexpr std::array colors = {Color::blue, Color::vermillion, Color::green, Color::purple,
+                                 Color::orange};
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    const Series& run = runs[i].series;
+    const Style style{
+        .name = runs[i].name, .color = colors[i % colors.size()], .width = noisy ? 1.1 : 1.6};
+    output.line(run.t, run.output, style);
+    error.line(run.t, run.error, style);
+    first.line(run.t, run.output_estimate_error, style);
+    estimate.line(run.t, run.estimate_error, style);
+    control.line(run.t, run.control, style);
+  }
+  if (noisy) {
+    const Inset zoom{.left = 0.2,
+                     .bottom = 0.62,
+                     .width = 0.6,
+                     .height = 0.34,
+                     .x = {2.0, 2.5},
+                     .connect = false};
+    control.y_range(-30, 80).inset(zoom);
+    estimate.y_range(-15, 40).inset(zoom);
+  }
+  output.y_range(-0.1, 1.1).y_tick(0.2).inset(
+      {.left = 0.5, .bottom = 0.2, .width = 0.46, .height = 0.5, .x = {3.4, 4.6}});
+  for (auto* panel : {&output, &error, &first, &estimate, &control}) {
+    panel->x_label("t (s)").legend(Legend::above);
+  }
+  return figure;
 }
 
 }  // namespace paper1
