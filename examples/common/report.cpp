@@ -147,8 +147,8 @@ std::string PrintedColumn::rule(std::size_t seeds) {
          "is " +
          text(100.0 * least_probability) + " % or more. It does not if the rms of z is above " +
          text(largest_rms) +
-         ": runs of a paper may have the same noise, and then the sum scatters more than p tells, "
-         "but at most as if all z were one number. Between the two it is doubtful. A single "
+         ". Runs of a paper may have the same noise; then the sum scatters more than p tells, but "
+         "at most as if all z were one number. Between the two it is doubtful. A single "
          "number is met within " +
          text(within) + " sd, but only in a column that reproduces; outside it is missed.";
 }

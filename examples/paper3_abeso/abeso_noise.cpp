@@ -228,8 +228,8 @@ int main(int argc, char** argv) {
   const std::vector<std::string> indexes(index_names.begin(), index_names.end());
   const std::vector<std::string> rises(rise_names.begin(), rise_names.end());
   const std::vector<std::string> peaks(peak_names.begin(), peak_names.end());
-  const std::string mean = "ours: mean (standard deviation) over " + std::to_string(seeds) +
-                           " seeds; how it is judged: table \"What reproduces\"";
+  const std::string mean = "Ours: mean (standard deviation) over " + std::to_string(seeds) +
+                           " seeds, judged as in the table \"What reproduces\"";
   const std::string index_is =
       "J = 100 mean(|error|) over the steps of the solver, 20 s. The paper prints the equations of "
       "the observer, the noise variance, the bandwidths and rho. ";
@@ -270,8 +270,8 @@ int main(int argc, char** argv) {
       "same scale.";
   const std::string rise_is =
       ". The definitions of t_r and peak are fitted, because those in the paper do not give its "
-      "numbers: t_r is when the error is back in [-0.01, 0.01] after its first overshoot (e_d: "
-      "after its second), peak is the largest error after t_r (e_d: after 5 s)";
+      "numbers. t_r is when the error is back in [-0.01, 0.01] after its first overshoot (e_d: "
+      "after its second). The peak is the largest error after t_r (e_d: after 5 s)";
   // Ours at bandwidth w + shift beside the printed numbers at w.
   const auto index_column = [](const Runs& runs, const Rows& printed, std::size_t from = 0,
                                std::size_t to = count, int shift = 0) {
@@ -334,9 +334,9 @@ int main(int argc, char** argv) {
   };
   judge_transient("Table 3, LESO: t_r and peaks", linear, table3_rise, table3_peak,
                   Verdict::reproduced);
-  report.comparison("2", "Table 2: LESO. " + index_is + "Fitted: nothing; " + mean,
+  report.comparison("2", "Table 2: LESO. " + index_is + "Nothing is fitted. " + mean,
                     cases(leso, 0, 6), indexes);
-  report.comparison("3", "Table 3: LESO, rise times" + rise_is + "; " + mean, cases(leso, 1, 3),
+  report.comparison("3", "Table 3: LESO, rise times" + rise_is + ". " + mean, cases(leso, 1, 3),
                     rises);
   report.comparison("3_peaks", "Table 3: LESO, peaks", cases(leso, 1, 3), peaks);
   report.add(draw_errors("fig2", leso, scale, "Fig. 2: LESO. " + errors_are));
@@ -353,7 +353,7 @@ int main(int argc, char** argv) {
       "4",
       "Table 4: BESO. " + index_is +
           "Fitted: it switches by the sign of the derivative of en (not of |en|), which is "
-          "filtered with 0.02 s and evaluated in every stage of the solver; " +
+          "filtered with 0.02 s and evaluated in every stage of the solver. " +
           mean,
       cases(beso, 0, 6), indexes);
   report.comparison("5", "Table 5: BESO, rise times, as in Table 3", cases(beso, 1, 3), rises);
@@ -363,9 +363,9 @@ int main(int argc, char** argv) {
                          "noise, which leaves a constant error. " +
                              errors_are));
 
-  // ---- Table 6, Fig. 4, and Table 7, which we do not have
+  // ---- Table 6, Fig. 4, and Table 7, which is missing in our copy of the text
   const std::string tried =
-      "some 10000 combinations of switching signal, filter, gains, solver and tolerances were "
+      "Some 10000 combinations of switching signal, filter, gains, solver and tolerances were "
       "tried, and none gives the ABESO";
   report.check_column("Table 6, ABESO: indexes", index_column(adjustable, table6),
                       Verdict::not_reproduced);
@@ -409,11 +409,11 @@ int main(int argc, char** argv) {
   report.check_column("Table 8, ABESO: t_r and reductions", numbers8, Verdict::not_reproduced);
   report.comparison("6",
                     "Table 6: ABESO. " + index_is +
-                        "Fitted: |en| is compared from one noise value to the next; " + mean,
+                        "Fitted: |en| is compared from one noise value to the next. " + mean,
                     cases(abeso, 0, 6), indexes);
   const std::string lost =
-      " (standard deviation). This table of the paper was not available to us; its rise times at w "
-      "= 7 are from Table 8";
+      " (standard deviation). The numbers of this table are missing in our copy of the text; its "
+      "rise times at w = 7 are from Table 8";
   report.comparison("7", "Table 7: ABESO, rise times; ours: mean" + lost, cases(abeso, 1, 3),
                     rises);
   report.comparison("7_peaks", "Table 7: ABESO, peaks; ours: mean" + lost, cases(abeso, 1, 3),
@@ -421,7 +421,7 @@ int main(int argc, char** argv) {
   report.add(draw_errors("fig4", abeso, scale, "Fig. 4: ABESO. " + errors_are));
   report.comparison("8",
                     "Table 8: reductions by the ABESO at w = 7 in %, from pairs of runs with the "
-                    "same seed (its other numbers are those of Tables 2 to 6); " +
+                    "same seed (its other numbers are those of Tables 2 to 6). " +
                         mean,
                     quantities, {"less than the LESO (%)", "less than the BESO (%)"});
   report.columns(seeds);
@@ -439,54 +439,181 @@ int main(int argc, char** argv) {
   report.expect("ABESO against LESO, w = 7", "less int |e_d| for t > 5 s (%)", in_steady,
                 std::abs(in_steady.mean) < in_steady.standard_deviation,
                 "no gain except in the transient: within a standard deviation of zero");
-  report.claim({.text = "At w = 7 the ABESO has 15 % less J_ed than the LESO",
-                .where = "Table 8",
-                .holds = std::abs(by_index.mean - 15.28) <=
-                                     PrintedColumn::within * by_index.standard_deviation &&
-                                 by_integral.mean > mean_by_integral.mean
-                             ? Claim::Holds::yes
-                             : Claim::Holds::no,
-                .here = shown_text(by_index.mean, 15.28) + " % by the paper's index, " +
-                        shown_text(by_integral.mean, 15.28) +
-                        " % by the time integral; after 5 s " + shown_text(in_steady.mean, 15.28) +
-                        " %: the whole gain is at the start. A LESO with the mean bandwidth of the "
-                        "ABESO gains " +
-                        shown_text(mean_by_integral.mean, 15.28) + " %",
-                .figure = "gain"});
-  const auto smaller_index = [&](const Runs& ours, const Runs& base) {
-    std::size_t smaller = 0;
-    for (std::size_t w = 0; w < count; ++w) {
+  // ---- what the paper claims of it
+  using Holds = Claim::Holds;
+  const auto verdict = [](bool holds) { return holds ? Holds::yes : Holds::no; };
+  const auto rise_of = [](const Runs& runs, std::size_t w, std::size_t i) {
+    return runs(w, [i](const Criteria& c) { return c.rise[i]; }).mean;
+  };
+  const auto peak_of = [](const Runs& runs, std::size_t w, std::size_t i) {
+    return runs(w, [i](const Criteria& c) { return c.peak[i]; }).mean;
+  };
+  std::size_t least = 0;
+  std::array<int, 3> rising{};
+  for (std::size_t w = 0; w < count; ++w) {
+    if (linear.index(w, 0).mean < linear.index(least, 0).mean) least = w;
+    for (std::size_t i = 0; i < 3 && w > 0; ++i) {
+      rising[i] += linear.index(w, i).mean > linear.index(w - 1, i).mean ? 1 : 0;
+    }
+  }
+  constexpr int all_steps = static_cast<int>(count) - 1;
+  report.claim({.text = "LESO: with w, J_ex falls at first, then rises.",
+                .where = "4, Example 1; Table 2",
+                .holds = verdict(least > 0 && least + 1 < count &&
+                                 rising[0] == all_steps - static_cast<int>(least)),
+                .here = "It is least at w = " + number_text(bandwidths[least]) + ".",
+                .figure = "2"});
+  report.claim({.text = "LESO: J_edx and J_ed keep rising.",
+                .where = "4, Example 1; Table 2",
+                .holds = rising[1] == all_steps && rising[2] == all_steps ? Holds::yes
+                         : rising[2] == all_steps                         ? Holds::partly
+                                                                          : Holds::no,
+                .here = "J_ed does; J_edx falls from " +
+                        shown_text(linear.index(0, 1).mean, 10.79) + " at w = 4 to " +
+                        shown_text(linear.index(1, 1).mean, 10.73) + " at 5, as in Table 2 itself.",
+                .figure = "2"});
+  // From w = 5 to 6 to 7: are rise times shorter and peaks larger?
+  const auto faster_with_peaks = [&](const Runs& runs) {
+    bool holds = true;
+    for (std::size_t w = 2; w <= 3; ++w) {
       for (std::size_t i = 0; i < 3; ++i) {
-        smaller += ours.index(w, i).mean < base.index(w, i).mean ? 1U : 0U;
+        holds = holds && rise_of(runs, w, i) < rise_of(runs, w - 1, i) &&
+                peak_of(runs, w, i) > peak_of(runs, w - 1, i);
       }
     }
-    return smaller;
+    return holds;
   };
-  const std::size_t over_linear = smaller_index(adjustable, linear);
-  const std::size_t over_bi = smaller_index(adjustable, bi);
-  const auto holds_of = [](std::size_t met) {
-    return met == 3 * count ? Claim::Holds::yes : met > 0 ? Claim::Holds::partly : Claim::Holds::no;
+  const auto from_to = [&](const Runs& runs) {
+    return "From w = 5 to 7, t_r of e_d falls from " + shown_text(rise_of(runs, 1, 2), 2.09) +
+           " to " + shown_text(rise_of(runs, 3, 2), 2.09) + " s, its peak rises from " +
+           shown_text(peak_of(runs, 1, 2), .53) + " to " + shown_text(peak_of(runs, 3, 2), .53) +
+           "; the others move alike.";
   };
-  report.claim({.text = "The ABESO has smaller indexes than the LESO (all but w = 10)",
-                .where = "Tables 2, 6",
-                .holds = holds_of(over_linear),
-                .here = std::to_string(over_linear) + " of 21 means are smaller; J_ex is not",
+  report.claim({.text = "LESO: with w, rise times get shorter and peaks larger.",
+                .where = "4, Example 1; Fig 2, Table 3",
+                .holds = verdict(faster_with_peaks(linear)),
+                .here = from_to(linear),
+                .figure = "fig2"});
+  report.claim({.text = "BESO: with w, rise times get shorter and peaks larger.",
+                .where = "4, Example 2; Table 5",
+                .holds = verdict(faster_with_peaks(bi)),
+                .here = from_to(bi),
+                .figure = "fig3"});
+  report.claim({.text = "The BESO has shorter rise times of e_x and e_dx than the LESO.",
+                .where = "4, Example 2; Tables 3, 5",
+                .holds = verdict(rise_of(bi, w7, 0) < rise_of(linear, w7, 0) &&
+                                 rise_of(bi, w7, 1) < rise_of(linear, w7, 1)),
+                .here = "At w = 7: " + shown_text(rise_of(bi, w7, 0), .47) + " and " +
+                        shown_text(rise_of(bi, w7, 1), .39) + " s, LESO " +
+                        shown_text(rise_of(linear, w7, 0), .5) + " and " +
+                        shown_text(rise_of(linear, w7, 1), .46) + " s.",
+                .figure = "fig3"});
+  const double noisier = bi.index(w7, 2).mean / linear.index(w7, 2).mean;
+  report.claim({.text = "The BESO is more sensitive to noise, above all in the total disturbance.",
+                .where = "4, Example 2; Fig 3",
+                .holds = verdict(noisier > 1.5),
+                .here = "At w = 7 its J_ed is " + number_text(noisier, 2) +
+                        " times that of the LESO, J_edx " +
+                        number_text(bi.index(w7, 1).mean / linear.index(w7, 1).mean, 2) + " times.",
+                .figure = "fig3"});
+  // w = 4 to 9, three indexes, beside each of the other two observers.
+  std::size_t below_linear = 0;
+  std::size_t below_bi = 0;
+  for (std::size_t w = 0; w + 1 < count; ++w) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      below_linear += adjustable.index(w, i).mean < linear.index(w, i).mean ? 1U : 0U;
+      below_bi += adjustable.index(w, i).mean < bi.index(w, i).mean ? 1U : 0U;
+    }
+  }
+  report.claim({.text = "For w = 4 to 9 the ABESO has the smallest indexes of the three.",
+                .where = "4, Example 3; Tables 2, 4, 6",
+                .holds = below_linear + below_bi == 36 ? Holds::yes
+                         : below_linear + below_bi > 0 ? Holds::partly
+                                                       : Holds::no,
+                .here = "Of 18 it has " + std::to_string(below_bi) + " below the BESO and " +
+                        std::to_string(below_linear) + " below the LESO: J_edx and J_ed, not J_ex.",
                 .figure = "gain"});
-  report.claim({.text = "The ABESO has smaller indexes than the BESO",
-                .where = "Tables 4, 6",
-                .holds = holds_of(over_bi),
-                .here = std::to_string(over_bi) + " of 21 means are smaller",
+  const auto over_bi = paired_gain(a7, bi.at[w7], ed);
+  const auto is_met = [](const Statistics& ours, double printed) {
+    return std::abs(ours.mean - printed) <= PrintedColumn::within * ours.standard_deviation;
+  };
+  report.claim({.text = "At w = 7 the ABESO has 15.28 % less J_ed than the LESO.",
+                .where = "abstract; 4, Example 3; Table 8",
+                .holds = verdict(is_met(by_index, table8_index_over_leso[2])),
+                .here = shown_text(by_index.mean, 15.2) +
+                        " %, and the whole gain is at the start: none is left after 5 s. A LESO "
+                        "with the mean bandwidth of the ABESO gains " +
+                        shown_text(mean_by_integral.mean, 15.2) + " %.",
                 .figure = "gain"});
+  report.claim({.text = "At w = 7 the ABESO has 68.21 % less J_ed than the BESO.",
+                .where = "4, Example 3; Table 8",
+                .holds = verdict(is_met(over_bi, table8_index_over_beso[2])),
+                .here = shown_text(over_bi.mean, 68.2) + " %.",
+                .figure = "8"});
+  Series drawn_linear, drawn_adjustable;
+  (void)run(leso, bandwidths[w7], 1, &drawn_linear);
+  (void)run(abeso, bandwidths[w7], 1, &drawn_adjustable);
+  const auto largest = [](const std::vector<double>& values) {
+    double most = 0.0;
+    for (const double value : values) most = std::max(most, std::abs(value));
+    return most;
+  };
+  // The mean of |e_d| over t > 5 s, 15 of the 20 s that Criteria divides by.
+  const double later_error = adjustable(w7, ed_steady).mean / 100.0 * 20.0 / 15.0;
+  const double largest_disturbance = largest(drawn_adjustable.disturbance);
+  report.claim({.text = "The ABESO tracks the total disturbance well in noise.",
+                .where = "4, Example 3; Fig 4",
+                .holds = verdict(later_error < 0.1 * largest_disturbance),
+                .here = "After 5 s the mean error is " + shown_text(later_error, .28) +
+                        " of a disturbance of up to " + shown_text(largest_disturbance, 2.5) + ".",
+                .figure = "fig4"});
+  int shorter = 0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    shorter += rise_of(adjustable, w7, i) < rise_of(linear, w7, i) ? 1 : 0;
+  }
   const auto slower = paired_gain(a7, l7, [](const Criteria& c) { return c.rise[1]; });
-  report.claim({.text = "The ABESO is as fast as the LESO, or faster",
-                .where = "Table 8, t_r",
-                .holds = slower.mean > -2.0 ? Claim::Holds::yes : Claim::Holds::no,
-                .here = "t_r of e_dx is " + shown_text(-slower.mean, 10.87) + " % longer",
+  report.claim({.text = "The ABESO has shorter rise times than the LESO.",
+                .where = "4, Example 3; Table 8",
+                .holds = shorter == 3  ? Holds::yes
+                         : shorter > 0 ? Holds::partly
+                                       : Holds::no,
+                .here = std::to_string(shorter) + " of 3 are shorter at w = 7; that of e_dx is " +
+                        shown_text(-slower.mean, 9.3) + " % longer.",
+                .figure = "7"});
+  report.claim({.text = "The ABESO tracks the total disturbance faster than the BESO.",
+                .where = "4, Example 3; Table 8",
+                .holds = verdict(rise_of(adjustable, w7, 2) < rise_of(bi, w7, 2)),
+                .here = "t_r of e_d at w = 7 is " + shown_text(rise_of(adjustable, w7, 2), 1.33) +
+                        " s, BESO " + shown_text(rise_of(bi, w7, 2), 2.22) + " s.",
+                .figure = "7"});
+  double peak_change = 0.0;
+  for (std::size_t w = 1; w <= 3; ++w) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      peak_change =
+          std::max(peak_change, std::abs(peak_of(adjustable, w, i) / peak_of(linear, w, i) - 1.0));
+    }
+  }
+  report.check("start, w = 7, seed 1", "largest error of d, LESO", std::nullopt,
+               largest(drawn_linear.error[2]));
+  report.check("start, w = 7, seed 1", "largest error of d, ABESO", std::nullopt,
+               largest(drawn_adjustable.error[2]));
+  const double start_change =
+      1.0 - largest(drawn_adjustable.error[2]) / largest(drawn_linear.error[2]);
+  report.claim({.text = "The ABESO has no obvious effect on the peaking.",
+                .where = "4, Example 3; 5",
+                .holds = peak_change > 0.1    ? Holds::no
+                         : start_change > 0.1 ? Holds::partly
+                                              : Holds::yes,
+                .here = "On the tabulated peaks it has not: they change by " +
+                        number_text(100.0 * peak_change, 2) +
+                        " % at most. At the start its largest error of d is " +
+                        number_text(100.0 * start_change, 2) +
+                        " % smaller than that of the LESO (w = 7, seed 1).",
                 .figure = "fig4"});
 
   report.not_reproduced(
       "The indexes of Tables 2, 4 and 6 are not time integrals, as the text says, but means over "
-      "the steps of a variable-step solver: six more steps near t = 0, where e_x = 1, raise J_ex "
+      "the steps of a variable-step solver. Six more steps near t = 0, where e_x = 1, raise J_ex "
       "by 0.3.",
       Miss::other_reading);
   report.not_reproduced(
@@ -495,7 +622,7 @@ int main(int argc, char** argv) {
       Miss::other_reading);
   report.not_reproduced(
       "The ABESO (Tables 6 and 8) is not reproduced: judged together its numbers are too far away, "
-      "so none of them counts as met, also where one is near; " +
+      "so none of them counts as met, also where one is near. " +
       tried + ".");
   report.not_reproduced(
       "The BESO (Tables 4 and 5) is doubtful: its numbers are farther away than single runs with "
@@ -523,11 +650,10 @@ int main(int argc, char** argv) {
   report.table(
       "gain",
       "When the ABESO is better: by how many % its error of the disturbance is smaller than that "
-      "of the LESO with the same w, from pairs of runs with the same seed, mean (standard "
-      "deviation) over " +
-          std::to_string(seeds) +
-          " seeds: by the index of the paper, by the time integral, and by the time integral of "
-          "the two parts of the run. For comparison, the LESO with the mean bandwidth of the ABESO",
+      "of the LESO with the same w. By the index of the paper, by the time integral, and by that "
+      "of the two parts of the run; for comparison, the LESO with the mean bandwidth of the ABESO. "
+      "Mean (standard deviation) of pairs of runs with the same seed, " +
+          std::to_string(seeds) + " seeds",
       {"w (rad/s)", "paper", "index", "integral", "t < 5 s", "t > 5 s", "mean bandwidth",
        "LESO at it", "t < 5 s", "t > 5 s"},
       lines);
@@ -567,9 +693,9 @@ int main(int argc, char** argv) {
   report.table(
       "beso_readings",
       "Table 4 with other readings of the switching rule: numbers within 2 sd, and mean deviation "
-      "from the printed ones. The rule takes the filtered derivative of en in every stage "
-      "(as for the table above), the same at the steps only, en compared from one noise "
-      "value to the next, or |en| compared in this way",
+      "from the printed ones. The rule takes the filtered derivative of en, in every stage (as for "
+      "the table above) or at the steps only; or it compares en, or |en|, from one noise value to "
+      "the next",
       {"index", "filtered, stages", "filtered, steps", "en", "|en|"}, lines);
   lines.clear();
   readings(table6, {&adjustable, &fitted, &adjustable_innovation});

@@ -235,9 +235,9 @@ int main(int argc, char** argv) {
   report.table(
       "limits",
       "Smallest rho with a common quadratic Lyapunov function, by the closed form and by the "
-      "general test on the gain sets; the same for the BESO (its two bandwidths differ by rho^2); "
-      "the largest rho for which a periodic switching was found that makes the error grow; and the "
-      "limits for sampled observers",
+      "general test on the gain sets, and the same for the BESO (its two bandwidths differ by "
+      "rho^2). The largest rho for which a periodic switching was found that makes the error grow. "
+      "The limits for sampled observers",
       {"N", "closed form", "test", "BESO", "grows from", "w T = 0.1", "w T = 1", "w T = 3"}, lines);
 
   const Switching bad = worst_switching<3>(0.2);
@@ -247,18 +247,44 @@ int main(int argc, char** argv) {
   report.expect("N = 3, rho = 0.7", "growth (units of w)", fair.growth, fair.growth < 0.0,
                 "no switching found that grows");
   report.remark(
-      "Below the first limit no common quadratic Lyapunov function exists; below the second there "
-      "are periodic switchings that make the error grow. Between the two neither is proven. With "
-      "the switching rule of the observer the error decayed in every noise-free trial, but noise "
-      "may make the rule switch in any way. AdjustableBandwidthEso refuses a ratio below the first "
-      "limit unless allow_uncertified_switching is set.");
-  report.claim({.text = "The error decays under any switching, for every rho",
+      "Below the first limit no common quadratic Lyapunov function exists. Below the second there "
+      "are periodic switchings that make the error grow. Between the two neither is proven.");
+  report.remark(
+      "With the switching rule of the observer the error decayed in every noise-free trial, but "
+      "noise may make the rule switch in any way. AdjustableBandwidthEso refuses a ratio below the "
+      "first limit unless allow_uncertified_switching is set.");
+  report.claim({.text = "The switched system is quadratically stable for every rho > 0.",
                 .where = "Lemma 2",
                 .holds = bad.growth > 0.0 ? Claim::Holds::no : Claim::Holds::not_tested,
-                .here = "at rho = 0.2, N = 3, it grows at " + shown_text(bad.growth, 0.048) +
-                        " w under a periodic switching; proven for 1/3 < rho < 3, which includes "
-                        "the 0.7 of the paper",
+                .here = "At rho = 0.2, N = 3, the error grows at " + shown_text(bad.growth, 0.048) +
+                        " w under a periodic switching. It holds for 1/3 < rho < 3, which includes "
+                        "the 0.7 of the paper.",
                 .figure = "stability"});
+  report.claim(
+      {.text = "The error converges to a bound in finite time.",
+       .where = "Theorem 1",
+       .holds = bad.growth > 0.0 && fair.growth < 0.0 ? Claim::Holds::partly : Claim::Holds::no,
+       .here = "Where the two modes share a matrix P, that is, for 1/3 < rho < 3: the "
+               "proof takes P from Lemma 2.",
+       .figure = "stability"});
+  // delta-bar of (13).
+  const auto delta_bar = [](double delta) {
+    const double square = delta * delta;
+    return 9.0 * square + 9.0 * square * square + square * square * square;
+  };
+  report.claim(
+      {.text = "For rho < 1 the bound (21) shows the ABESO to be more accurate than the LESO.",
+       .where = "abstract; Remark 2",
+       .holds = delta_bar(0.7) < 1.0 ? Claim::Holds::not_tested : Claim::Holds::no,
+       .here = "It rests on delta-bar < 1, but delta-bar is " + number_text(delta_bar(0.7), 2) +
+               " at 0.7 and " + number_text(delta_bar(1.0), 2) +
+               " at 1, which the ABESO uses, too; so its bound is not smaller.",
+       .figure = "limits"});
+  report.correction({.where = "Remark 2",
+                     .printed = "delta-bar < 1 for rho < 1",
+                     .correct = "delta-bar = 9 delta^2 + 9 delta^4 + delta^6, " +
+                                number_text(delta_bar(1.0), 2) + " at delta = 1",
+                     .why = "from its definition under (13), which also lacks a square root"});
   report.correction(
       {.where = "(9), Lemma 2",
        .printed = "factors of F from which a common Lyapunov function follows for every rho",
