@@ -50,6 +50,21 @@ TEST(CKinds, OfDelaysAndOtherForms) {
   equals_controller<Adrc<DelayedInput<ModelEso<lag, double>, 3>>>(30000, 301, "gcc -std=c99", 2);
 }
 
+/// A rate of which u cannot hold every step: what waits is a state of the C, too.
+TEST(CKinds, OfARateBelowTheDigits) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  for (const double digits : {0.05, 3.0}) {
+    const auto slow = [digits](auto& settings) {
+      using V = decltype(settings.limits.rate);
+      settings.limits.rate = static_cast<V>(digits) * std::numeric_limits<V>::epsilon() * V(128);
+    };
+    equals_changed<Adrc<LinearEso<1, float>>>(30000, 341, "gcc -std=c99", slow);
+    equals_changed<Adrc<DelayedInput<LinearEso<2, double>, 3>, ErrorBased>>(30000, 351,
+                                                                            "gcc -std=c99", slow);
+    equals_changed<DisturbanceCompensator<LinearEso<1, float>>>(30000, 361, "gcc -std=c99", slow);
+  }
+}
+
 #endif
 
 }  // namespace target_c_kinds_test

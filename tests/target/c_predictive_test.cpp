@@ -66,10 +66,11 @@ class InTwoPhases {
   int (*self_test_)(V) = nullptr;
 };
 
-/// @param change of the settings
+/// @param change of the settings @param controls whether it is fast enough to control the plant
 template <class C, class Change = void (*)(typename C::Config&)>
 void predicts(
-    std::uint64_t seed, const Change& change = [](auto&) {}, int samples = 30000) {
+    std::uint64_t seed, const Change& change = [](auto&) {}, int samples = 30000,
+    bool controls = true) {
   SCOPED_TRACE(testing::internal::GetTypeName<C>());
   using V = typename C::scalar_type;
   using Observer = std::remove_cvref_t<decltype(std::declval<C>().observer())>;
@@ -134,6 +135,7 @@ void predicts(
             << "sample " << k << ", estimate " << row;
       });
     }
+    if (!controls) continue;
     if constexpr (requires { config.observer.outlier_threshold; }) {
       EXPECT_EQ(outliers > samples / 2000, config.observer.outlier_threshold > V(0));
     }
@@ -151,6 +153,17 @@ TEST(CPredictive, EqualsTheController) {
   predicts<PredictiveAdrc<LinearEso<1, float>>>(811);
   predicts<PredictiveAdrc<HalfGainEso<2, float>>>(821);
   predicts<PredictiveAdrc<ModelEso<lag, double>>>(831);
+}
+
+/// A rate of which u cannot hold every step.
+TEST(CPredictive, OfARateBelowTheDigits) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  for (const float digits : {0.05f, 3.0f}) {
+    const auto slow = [digits](auto& settings) {
+      settings.limits.rate = digits * std::numeric_limits<float>::epsilon() * 128;
+    };
+    predicts<PredictiveAdrc<LinearEso<1, float>>>(815, slow, 30000, false);
+  }
 }
 
 #ifndef ESOKIT_ONE_TYPE

@@ -274,9 +274,7 @@ class ControlLoop {
   /// them, nothing changes.
   Check<S> adopt(const ControlLoop& fresh) {
     if (auto ok = observer_.adopt(fresh.observer_); !ok) return ok;
-    const S last = limiter_.last();
-    limiter_ = fresh.limiter_;
-    limiter_.track(last);
+    limiter_.adopt(fresh.limiter_);
     // After a change of the divider the next update is one with a measurement.
     if (set_.divider != fresh.set_.divider) phase_ = 0;
     set_ = fresh.set_;
@@ -290,10 +288,9 @@ class ControlLoop {
   requires(observer_traits<O>.varies_time) Check<S> set_step_time(const S& seconds)
   noexcept {
     if (auto ok = observer_.set_step_time(seconds); !ok) return ok;
-    auto limiter = Limiter<S>::make(set_.limits, seconds);
+    const auto limiter = Limiter<S>::make(set_.limits, seconds);
     if (!limiter) return limiter.error();
-    limiter->track(limiter_.last());
-    limiter_ = *limiter;
+    limiter_.adopt(*limiter);
     return {};
   }
 

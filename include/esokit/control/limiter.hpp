@@ -21,6 +21,10 @@ struct Limits {
 ///
 /// The bounds of the next step are computed in advance from the last output, so that only a minimum
 /// and a maximum are left between command and output.
+///
+/// A step of rate x T that the digits of u cannot hold waits until it has become large enough, so
+/// the rate holds at any magnitude; it may be exceeded by one digit of u. Where a step is above
+/// 1024 digits of the larger magnitude limit nothing can be lost, and nothing is added to the work.
 template <Scalar S = double>
 class Limiter {
  public:
@@ -30,8 +34,8 @@ class Limiter {
 
   /// Checks the limits.
   /// @param limits limits of the actuator @param sample_time T, s
-  /// @return error for limits that are crossed or not finite, or a rate or sample time that is not
-  ///         positive
+  /// @return error for limits that are crossed or not finite, a rate or sample time that is not
+  ///         positive, or a rate that the scalar cannot hold beside the limits
   static Expected<Limiter, Error<S>> make(const Limits<S>& limits, const S& sample_time) {
     detail::refuse_packs<S>();
     Rules<S> rules;
@@ -43,15 +47,41 @@ class Limiter {
             {"limits.lower", limits.lower, "must be below limits.upper", -1, limits.upper, true})
         .positive("limits.rate", limits.rate);
     if (!rules) return rules.error();
-    return Limiter(limits, sample_time);
+    Limiter limiter(limits, sample_time);
+    if (!(limiter.rate_limited_ == false)) {
+      rules.representable("limits.rate", limits.rate, limiter.step_,
+                          "times sample_time leaves the scalar's range");
+      // What waits would be lost itself.
+      const S least = detail::rounding<S>() * limiter.grain();
+      const bool bounded =
+          all(limits.lower > Limits<S>{}.lower && limits.upper < Limits<S>{}.upper);
+      rules.require(
+          !bounded || all(limiter.step_ > least),
+          {"limits.rate", limits.rate,
+           "is lost beside the limits; in a sample u must move by more than", -1, least, true});
+    }
+    if (!rules) return rules.error();
+    return limiter;
   }
 
   /// The output nearest to `command` within the limits; stored as the last output.
   /// @param command finite, as is everything computed from an observer's estimate
   constexpr S operator()(const S& command) noexcept {
     const S output = clamp(command);
-    track(output);
+    settle(output);
     return output;
+  }
+
+  /// Ends a step: `output` is what `clamp` gave for it.
+  constexpr void settle(const S& output) noexcept {
+    if (rate_limited_ == false) {
+      last_ = output;
+      return;
+    }
+    if (!(waits_ == false)) [[unlikely]]
+      return settle_digits(output);
+    last_ = output;
+    reach(step_);
   }
 
   /// The output that `command` would give; nothing is stored.
@@ -64,16 +94,20 @@ class Limiter {
     return smaller(larger(u, lower_), upper_);
   }
 
-  /// Reports what the actuator really held; the rate limit counts from there.
+  /// Takes over at `output`, however far it is from the last one: the rate limit counts from there.
   constexpr void track(const S& output) noexcept {
     last_ = output;
     // Without a rate limit the bounds do not change.
     if (rate_limited_ == false) return;
-    low_ = larger(lower_, S(output - step_));
-    high_ = smaller(upper_, S(output + step_));
-    // A reported output may be beyond a magnitude limit by more than a step.
-    low_ = smaller(low_, upper_);
-    high_ = larger(high_, lower_);
+    reach(larger(S(step_ + waiting_), S(0.0)));
+  }
+
+  /// Takes over the limits of `fresh`; the last output is kept.
+  constexpr void adopt(const Limiter& fresh) noexcept {
+    const S last = last_, waiting = waiting_;
+    *this = fresh;
+    waiting_ = select(is_coarse(), S(0.0), waiting);
+    track(last);
   }
 
   /// The last output.
@@ -83,11 +117,17 @@ class Limiter {
   [[nodiscard]] constexpr const S& lower() const noexcept { return lower_; }
   [[nodiscard]] constexpr const S& upper() const noexcept { return upper_; }
   /// @}
+  /// Largest change of u in a sample, unit of u; infinite without a limit of rate.
+  [[nodiscard]] constexpr const S& step() const noexcept { return step_; }
+  /// Whether a step may be too small for the digits of u, and then waits.
+  [[nodiscard]] constexpr Lanes<bool, S> waits() const noexcept { return waits_; }
+  /// What waits at present, unit of u.
+  [[nodiscard]] constexpr const S& waiting() const noexcept { return waiting_; }
 
  private:
   friend struct detail::LaneAccess;
 
-  static constexpr int data_members = 7;
+  static constexpr int data_members = 9;
 
   Limiter(const Limits<S>& limits, const S& sample_time) noexcept
       : lower_(limits.lower),
@@ -98,7 +138,34 @@ class Limiter {
         rate_limited_(!all(limits.rate >= Limits<S>{}.rate) && all(is_finite(step_))) {
     // In a pack a lane without a rate limit gets an infinite step.
     if (rate_limited_ == false) step_ = S(detail::unbounded<LaneScalar<S>>());
+    waits_ = !(rate_limited_ == false) && !all(is_coarse());
     track(within(S(0.0)));
+  }
+
+  /// A digit of the largest u.
+  [[nodiscard]] constexpr S grain() const noexcept {
+    return detail::rounding<S>() * larger(detail::absolute(lower_), detail::absolute(upper_));
+  }
+
+  /// Whether the digits of any u hold a step.
+  [[nodiscard]] constexpr auto is_coarse() const noexcept { return S(1024.0) * grain() < step_; }
+
+  /// `settle`, with what the step left over or took in advance: at most a digit of the output.
+  ESOKIT_COLD constexpr void settle_digits(const S& output) noexcept {
+    const S digit = detail::rounding<S>() * detail::absolute(output);
+    const S left = waiting_ + (step_ - detail::absolute(S(output - last_)));
+    // Further away than a step: the output was reported. And a lane may need no waiting.
+    waiting_ = smaller(select(left < -digit, S(0.0), left), digit);
+    waiting_ = select(is_coarse(), S(0.0), waiting_);
+    track(output);
+  }
+
+  constexpr void reach(const S& step) noexcept {
+    low_ = larger(lower_, S(last_ - step));
+    high_ = smaller(upper_, S(last_ + step));
+    // A reported output may be beyond a magnitude limit by more than a step.
+    low_ = smaller(low_, upper_);
+    high_ = larger(high_, lower_);
   }
 
   static constexpr S smaller(const S& a, const S& b) noexcept { return detail::lower_one(a, b); }
@@ -110,7 +177,9 @@ class Limiter {
   S last_{};
   S low_;
   S high_;
+  S waiting_{};  ///< part of the steps so far that the digits of the output could not hold
   Lanes<bool, S> rate_limited_;
+  Lanes<bool, S> waits_{};  ///< whether that can happen
 };
 
 }  // namespace esokit

@@ -198,9 +198,11 @@ class MimoAdrc {
       }
     });
     if (!outcome) return outcome;
+    auto limiters = limiters_;
+    for (std::size_t i = 0; i < channels; ++i) limiters[i].adopt(fresh.limiters_[i]);
     *this = fresh;
     observers_ = observers;
-    for (std::size_t i = 0; i < channels; ++i) limiters_[i].track(u(static_cast<int>(i)));
+    limiters_ = limiters;
     return {};
   }
 

@@ -145,7 +145,7 @@ class PredictiveAdrc {
   StepStatus prepare(const Reference& next_reference) noexcept {
     StepStatus status = StepStatus::ok;
     if (phase_ == Phase::measured) status |= observer_.correct(measurement_);
-    limiter_.track(output_);
+    limiter_.settle(output_);
     status |= observer_.predict(output_);
     phase_ = Phase::prepared;
     if (hold_left_ > 0) --hold_left_;
@@ -218,7 +218,7 @@ class PredictiveAdrc {
   Check<S> adopt(const PredictiveAdrc& fresh) {
     if (auto ok = observer_.adopt(fresh.observer_); !ok) return ok;
     set_ = fresh.set_;
-    limiter_ = fresh.limiter_;
+    limiter_.adopt(fresh.limiter_);
     limiter_.track(output_);
     arm();
     return {};

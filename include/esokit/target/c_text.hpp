@@ -202,7 +202,7 @@ static unsigned prepare($name_state *o, $real next_r)
   if (o->phase == 1u) {
     status = correct_$top(o, o->measurement);
   }
-  (void)track(o);
+  (void)$SETTLE(o);
   status |= predict_$top(o, o->u_last);
   o->phase = 0u;
   if (o->hold_left > 0u) {

@@ -618,6 +618,7 @@ inline Words c_phase_words(const RecordedDesign& design) {
                                  "else {\n    (void)control_blind(o, &u);\n  }\n"
                                : "  (void)control_by(o, y, &u);\n"},
       {"$LIMITS", ""},
+      {"$SETTLE", design.waits ? "settle" : "track"},
       {"$COLUMNS", "y, next r, u"},
       {"$RESULT", "const $real result = $name_update(&o, samples[i][0], samples[i][1]);"}};
 }

@@ -303,19 +303,8 @@ class FixedRecord {
     }
     lower = std::nearbyint(lower);
     upper = std::nearbyint(upper);
-    const RecordedCall& limit = called("limit");
-    std::vector<double> values = design_->numbers;
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      if (design_->members[i] == "u_low") values[i] = design_->lower;
-      if (design_->members[i] == "u_high") values[i] = design_->upper;
-    }
-    const LinearCall at_lower(limit, std::vector<int>(values.size(), -1), values, 0,
-                              {design_->lower});
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      if (design_->members[i] != "u_high" || limit.next[i] < 0) continue;
-      const double high = at_lower.number(limit.next[i]);
-      if (high < design_->upper) rate = (high - design_->lower) / options_.u.unit;
-    }
+    // A step as large as the range limits nothing.
+    if (design_->rate < design_->upper - design_->lower) rate = design_->rate / options_.u.unit;
     const LinearCall forms = linear(called("law"), {column});
     if (!forms.is_linear(called("law").outputs[0])) {
       return refuse("controller", 0, "has a law that is not linear");

@@ -88,7 +88,9 @@ struct RecordAccess {
     if constexpr (requires { c.loop_; }) {
       take(c.loop_.limiter_, "limit");
       const Number* last = &c.loop_.limiter_.last();
-      std::erase_if(found, [last](const auto& one) { return one.first == last; });
+      const Number* waiting = &c.loop_.limiter_.waiting();
+      std::erase_if(found,
+                    [&](const auto& one) { return one.first == last || one.first == waiting; });
       if constexpr (requires { c.law_; }) {
         take(c.law_, "law");
         take(c.weights_, "law");
@@ -120,8 +122,9 @@ struct RecordAccess {
     return armed<Numbers>(c);
   }
   /// The lists around which its text goes.
+  /// @param waits whether the limiter's steps may wait
   template <class Number, class Observer, class Add>
-  static void add_phases(const Add& add) {
+  static void add_phases(bool waits, const Add& add) {
     using Numbers = std::vector<Number>;
     constexpr RunningLaw runs = kind_of<LawOf<Observer>>;
     constexpr int size = Observer::size;
@@ -149,6 +152,12 @@ struct RecordAccess {
       c.limiter_.track(c.output_);
       return Numbers{};
     });
+    if (waits) {
+      add("settle", "", false, [](auto& c, const auto&) {
+        c.limiter_.settle(c.output_);
+        return Numbers{};
+      });
+    }
     add("revise", "u", false, [](auto& c, const auto& in) {
       (void)c.observer_.revise_input(in[0]);
       return Numbers{};

@@ -472,11 +472,17 @@ template <class Bare, class BareObserver>
   }
   const auto name_of = [](const auto& c, const Number* at) -> std::string {
     // The limiter keeps the bounds of the next output behind the last.
-    constexpr const char* names[] = {"u_last", "u_low", "u_high"};
+    constexpr const char* names[] = {"u_last", "u_low", "u_high", "u_waiting"};
     const auto place = at - &c.output();
-    return 0 <= place && place < 3 ? names[place] : at == &c.requested() ? "u_asked" : "";
+    return 0 <= place && place < 4 ? names[place] : at == &c.requested() ? "u_asked" : "";
   };
   return maker.record(OfController{}, name_of);
+}
+
+template <Scalar S>
+void take_rate(RecordedDesign& design, const Limiter<S>& limiter) {
+  if (is_finite(limiter.step())) design.rate = static_cast<double>(limiter.step());
+  design.waits = limiter.waits();
 }
 
 /// The design of a controller.
@@ -500,6 +506,7 @@ Expected<RecordedDesign, Error<typename C::scalar_type>> recorded_design(
   design.compensates = !requires { controller.gains(); };
   design.lower = static_cast<double>(controller.limiter().lower());
   design.upper = static_cast<double>(controller.limiter().upper());
+  take_rate(design, controller.limiter());
   take_adapters(design, controller.observer());
   design.law = Access::law_numbers(Access::core(bare.observer()));
 
@@ -554,16 +561,17 @@ Expected<RecordedDesign, Error<typename C::scalar_type>> recorded_design(
   design.hold = RecordAccess::hold_left(controller);
   design.lower = static_cast<double>(RecordAccess::limiter(controller).lower());
   design.upper = static_cast<double>(RecordAccess::limiter(controller).upper());
+  take_rate(design, RecordAccess::limiter(controller));
   maker.add("rest_at", "y u", false, [](auto& c, const Numbers& in) {
     RecordAccess::rest(RecordAccess::at_rest(OfPredictive{}(c)), in, false);
     return Numbers{};
   });
-  RecordAccess::add_phases<Number, Observer>([&]<class Call>(std::string_view name,
-                                                             std::string_view arguments,
-                                                             bool has_output, const Call&) {
-    maker.add(name, arguments, has_output,
-              [](auto& c, const Numbers& in) { return Call{}(c, in); });
-  });
+  RecordAccess::add_phases<Number, Observer>(
+      design.waits, [&]<class Call>(std::string_view name, std::string_view arguments,
+                                    bool has_output, const Call&) {
+        maker.add(name, arguments, has_output,
+                  [](auto& c, const Numbers& in) { return Call{}(c, in); });
+      });
   const auto name_of = [](const auto& c, const Number* at) -> std::string {
     return at == &c.output() ? "u_last" : "";
   };

@@ -175,6 +175,8 @@ struct RecordedDesign {
   LoopRules loop{};
   double lower = 0;
   double upper = 0;
+  double rate = 0;     ///< largest change of u in a sample; 0: any
+  bool waits = false;  ///< whether it may be too small for the digits of u
   bool error_based = false;
   bool softens = false;
   bool compensates = false;                      ///< r is the output of another controller
