@@ -55,7 +55,7 @@ class Limiter {
       const S least = detail::rounding<S>() * limiter.grain();
       const bool bounded =
           all(limits.lower > Limits<S>{}.lower && limits.upper < Limits<S>{}.upper);
-      rules.require(
+      rules.demand(
           !bounded || all(limiter.step_ > least),
           {"limits.rate", limits.rate,
            "is lost beside the limits; in a sample u must move by more than", -1, least, true});
@@ -66,22 +66,19 @@ class Limiter {
 
   /// The output nearest to `command` within the limits; stored as the last output.
   /// @param command finite, as is everything computed from an observer's estimate
-  constexpr S operator()(const S& command) noexcept {
-    const S output = clamp(command);
-    settle(output);
-    return output;
-  }
+  constexpr S operator()(const S& command) noexcept { return settle(clamp(command)); }
 
-  /// Ends a step: `output` is what `clamp` gave for it.
-  constexpr void settle(const S& output) noexcept {
+  /// Ends a step. @param output what `clamp` gave for it @return the same
+  constexpr S settle(S output) noexcept {
     if (rate_limited_ == false) {
       last_ = output;
-      return;
+      return output;
     }
     if (!(waits_ == false)) [[unlikely]]
       return settle_digits(output);
     last_ = output;
     reach(step_);
+    return output;
   }
 
   /// The output that `command` would give; nothing is stored.
@@ -138,7 +135,7 @@ class Limiter {
         rate_limited_(!all(limits.rate >= Limits<S>{}.rate) && all(is_finite(step_))) {
     // In a pack a lane without a rate limit gets an infinite step.
     if (rate_limited_ == false) step_ = S(detail::unbounded<LaneScalar<S>>());
-    waits_ = !(rate_limited_ == false) && !all(is_coarse());
+    waits_ = !all(is_coarse());
     track(within(S(0.0)));
   }
 
@@ -151,13 +148,14 @@ class Limiter {
   [[nodiscard]] constexpr auto is_coarse() const noexcept { return S(1024.0) * grain() < step_; }
 
   /// `settle`, with what the step left over or took in advance: at most a digit of the output.
-  ESOKIT_COLD constexpr void settle_digits(const S& output) noexcept {
+  ESOKIT_COLD constexpr S settle_digits(S output) noexcept {
     const S digit = detail::rounding<S>() * detail::absolute(output);
     const S left = waiting_ + (step_ - detail::absolute(S(output - last_)));
     // Further away than a step: the output was reported. And a lane may need no waiting.
     waiting_ = smaller(select(left < -digit, S(0.0), left), digit);
     waiting_ = select(is_coarse(), S(0.0), waiting_);
     track(output);
+    return output;
   }
 
   constexpr void reach(const S& step) noexcept {
@@ -179,7 +177,7 @@ class Limiter {
   S high_;
   S waiting_{};  ///< part of the steps so far that the digits of the output could not hold
   Lanes<bool, S> rate_limited_;
-  Lanes<bool, S> waits_{};  ///< whether that can happen
+  Lanes<bool, S> waits_{};  ///< whether the digits of some u do not hold a step
 };
 
 }  // namespace esokit
