@@ -212,62 +212,119 @@ int main(int argc, char** argv) {
   report.comparison(
       "3",
       "Table 3: ITAE = int t |r - x1| dt and ISU = int u^2 dt over 10 s. The paper prints the "
-      "noise, the plant, the form of the control law and g of scenario 2; the other 17 quantities "
-      "are fitted to these six numbers. Ours: mean (standard deviation) over " +
+      "noise, the plant, the form of the control law and g of scenario 2. The other 17 quantities, "
+      "among them the three bandwidths, are fitted to these six numbers. Ours: mean (standard "
+      "deviation) over " +
           std::to_string(seeds) +
           " seeds; not judged, because more is fitted than there are numbers",
       {cases[0].name, cases[1].name, cases[2].name}, {names[0], names[1]});
 
   report.add(draw("fig3",
-                  "Fig. 3, scenario 1: LESO with 101.66 rad/s, tuned without noise, with noise "
-                  "(one seed) and without. With noise the control stays at its limits.",
+                  "Fig. 3, scenario 1: LESO, with noise (one seed) and without. Its 101.66 rad/s "
+                  "are fitted here, the paper prints no bandwidth. With noise the control stays at "
+                  "its limits. The panel of the error is our addition.",
                   cases[0], tracked, true, Color::vermillion));
   report.add(draw("fig4",
-                  "Fig. 4, scenario 2: NHOESO with g of Table 2, tuned without noise, with noise "
-                  "(one seed) and without.",
+                  "Fig. 4, scenario 2: NHOESO with g of Table 2, at 10.06 rad/s (fitted), with "
+                  "noise (one seed) and without.",
                   cases[1], tracked, true));
-  report.add(draw("fig5", "Fig. 5, scenario 3: NHOESO with a fitted g, with noise and without.",
+  report.add(draw("fig5",
+                  "Fig. 5, scenario 3: NHOESO with a fitted g at 10.36 rad/s (fitted), with noise "
+                  "and without.",
                   cases[2], tracked, true));
 
   const auto mean_of = [&](std::size_t i, double Criteria::*number) {
     return statistics_of(runs_of(i), number).mean;
   };
   const auto both = [&](std::size_t i) {
-    return "ITAE " + shown_text(mean_of(i, &Criteria::itae)) + ", ISU " +
-           shown_text(mean_of(i, &Criteria::isu));
+    return "ITAE " + shown_text(mean_of(i, &Criteria::itae), 1.0) + ", ISU " +
+           shown_text(mean_of(i, &Criteria::isu), 1.0);
   };
   const auto better = [&](std::size_t i, std::size_t than) {
     return mean_of(i, &Criteria::itae) < mean_of(than, &Criteria::itae) &&
            mean_of(i, &Criteria::isu) < mean_of(than, &Criteria::isu);
   };
   using Holds = Claim::Holds;
-  report.claim({.text = "In noise the NHOESO is far better than the LESO",
-                .where = "Table 3, Figs 3, 4",
-                .holds = better(1, 6)   ? Holds::yes
-                         : better(1, 0) ? Holds::partly
-                                        : Holds::no,
-                .here = "than that LESO, tuned without noise to 101.66 rad/s (" + both(0) +
-                        "), it is (" + both(1) + "); a LESO of N = 4 at 4 rad/s has " + both(6),
-                .figure = "fair"});
-  report.claim({.text = "Parameters chosen by (29) reduce the effect of noise",
-                .where = "Table 3, Fig. 5",
-                .holds = mean_of(3, &Criteria::isu) < mean_of(1, &Criteria::isu)   ? Holds::yes
-                         : mean_of(2, &Criteria::isu) < mean_of(1, &Criteria::isu) ? Holds::partly
-                                                                                   : Holds::no,
-                .here = "a fitted g does (" + both(2) +
-                        "), the g_new that Table 2 prints cycles (" + both(3) + ")",
-                .figure = "cycle"});
+  const auto verdict = [](bool holds) { return holds ? Holds::yes : Holds::no; };
+  report.claim({.text = "The LESO tuned without noise responds worst to noise.",
+                .where = "6, Fig 3; Table 3",
+                .holds = verdict(better(1, 0) && better(2, 0)),
+                .here = "In the fitted setting: " + both(0) + "; scenario 2: " + both(1) + ".",
+                .figure = "fig3"});
+  // Total variation per noise value, in one seed.
+  const auto chatter = [&](std::size_t i, std::vector<double> Series::*signal) {
+    Series series;
+    (void)cases[i].run(noise_variance, 1, tracked, fitted_step, &series);
+    const auto& values = series.*signal;
+    double sum = 0.0;
+    for (std::size_t k = 1; k < values.size(); ++k) sum += std::abs(values[k] - values[k - 1]);
+    return sum / (duration / hold);
+  };
+  const std::array<double, 3> chatter_u = {chatter(0, &Series::u), chatter(1, &Series::u),
+                                           chatter(2, &Series::u)};
+  const std::array<double, 3> chatter_z = {
+      chatter(0, &Series::estimate), chatter(1, &Series::estimate), chatter(2, &Series::estimate)};
+  report.claim({.text = "The NHOESO tuned without noise tracks better, and u and the disturbance "
+                        "estimate chatter much less.",
+                .where = "6, Fig 4; Table 3",
+                .holds = verdict(better(1, 0) && chatter_u[1] < 0.5 * chatter_u[0] &&
+                                 chatter_z[1] < 0.5 * chatter_z[0]),
+                .here = "In the fitted setting the total variation of u per noise value is " +
+                        number_text(chatter_u[1], 2) + " (LESO " + number_text(chatter_u[0], 2) +
+                        "), that of z_3 " + number_text(chatter_z[1], 2) + " (LESO " +
+                        number_text(chatter_z[0], 2) + ").",
+                .figure = "fig4"});
+  const double less_effort =
+      100.0 * (1.0 - mean_of(2, &Criteria::isu) / mean_of(1, &Criteria::isu));
+  report.check("Table 3", "ISU less in scenario 3 than in 2 (%)", 59.3, less_effort, std::nullopt,
+               "not judged: g and bandwidths are fitted");
+  report.claim({.text = "With parameters by (29) chatter and control energy fall further, ISU by "
+                        "59.3 %.",
+                .where = "6, Fig 5; Table 3",
+                .holds = mean_of(3, &Criteria::isu) < mean_of(1, &Criteria::isu) ? Holds::yes
+                         : less_effort > 0.0                                     ? Holds::partly
+                                                                                 : Holds::no,
+                .here = "With a fitted g ISU falls by " + number_text(less_effort, 2) +
+                        " %, the total variation of u per noise value to " +
+                        number_text(chatter_u[2], 2) +
+                        ". With the g_new that Table 2 prints the loop cycles (" + both(3) + ").",
+                .figure = "fig5"});
+  report.claim({.text = "Parameters by (29) improve the accuracy of the response.",
+                .where = "6, Fig 5",
+                .holds = verdict(mean_of(2, &Criteria::itae) < mean_of(1, &Criteria::itae)),
+                .here = "ITAE rises from " + number_text(mean_of(1, &Criteria::itae), 3) + " to " +
+                        number_text(mean_of(2, &Criteria::itae), 3) +
+                        ", in Table 3 from 1.322 to 1.587.",
+                .figure = "3"});
+  const Criteria without_noise = cases[2].run(0.0, 1, tracked, fitted_step, nullptr);
+  const double more_error = 100.0 * (mean_of(2, &Criteria::itae) / without_noise.itae - 1.0);
+  const double more_effort = mean_of(2, &Criteria::isu) / without_noise.isu;
+  report.claim({.text = "With parameters by (29) noise has a negligible effect on the performance.",
+                .where = "7",
+                .holds = more_error > 20.0   ? Holds::no
+                         : more_effort > 1.2 ? Holds::partly
+                                             : Holds::yes,
+                .here = "With the fitted g it raises ITAE by " + number_text(more_error, 1) +
+                        " %, but ISU to " + number_text(more_effort, 2) +
+                        " times that without noise.",
+                .figure = "cases"});
+  report.claim({.text = "The nonlinear function filters without a delay in the estimation error.",
+                .where = "7",
+                .here = "The paper shows no result for it. g(e) has no memory; where k(e) < 1 the "
+                        "observer has a lower bandwidth.",
+                .figure = "fig5"});
+  report.claim({.text = "In noise the NHOESO has the least estimation errors at moderate energy.",
+                .where = "6, before Table 3",
+                .holds = verdict(!better(6, 2) || mean_of(6, &Criteria::amplitude) >
+                                                      mean_of(2, &Criteria::amplitude)),
+                .here = "A LESO of N = 4 at 4 rad/s has less of both (" + both(6) +
+                        "; scenario 3: " + both(2) + ") and the smallest error of z_1.",
+                .figure = "cases"});
   report.not_reproduced(
       "Table 3 comes out near with settings of which 17 quantities are fitted to its 6 numbers "
       "(limit on u, bandwidths, fal, R, duration, step, g of scenario 3). They are consistent with "
       "the paper, but need not be those of the paper.",
       Miss::not_published);
-  report.not_reproduced(
-      "The claim that the nonlinear observer is better than a linear one: scenario 1 has a linear "
-      "observer whose bandwidth (101.66 rad/s) was tuned without noise. A linear observer of 4 "
-      "rad/s (N = 4) is better than scenarios 2 and 3 in both numbers.",
-      Miss::claim);
-
   report.additions();
   report.table("cases",
                "All cases, mean (standard deviation) over " + std::to_string(seeds) +
@@ -328,17 +385,17 @@ int main(int argc, char** argv) {
   Figure ranking("ranking", {.rows = 1, .columns = 1, .panel_height = 230});
   ranking.caption(
       "Tracking error (ITAE) and control effort (ISU) of the table of all cases in noise: means "
-      "over the seeds. Less is better in both.");
+      "over the seeds. Less is better in both. The bandwidths of the scenarios are fitted.");
   struct Shown {
     const char* name;
     Color color;
     Marker marker;
   };
   constexpr std::array<Shown, 7> shown = {
-      {{"paper: linear, 101.66 rad/s", Color::vermillion, Marker::circle},
-       {"paper: nonlinear, g of Table 2", Color::blue, Marker::circle},
-       {"paper: nonlinear, g fitted", Color::blue, Marker::square},
-       {"paper: nonlinear by (29)", Color::blue, Marker::triangle},
+      {{"scenario 1: linear, 101.66 rad/s", Color::vermillion, Marker::circle},
+       {"scenario 2: nonlinear, g of Table 2", Color::blue, Marker::circle},
+       {"scenario 3: nonlinear, g fitted", Color::blue, Marker::square},
+       {"scenario 3 with g_{new} of Table 2", Color::blue, Marker::triangle},
        {"the same within proven limits", Color::blue, Marker::open_circle},
        {"linear, N = 3, 10 rad/s", Color::vermillion, Marker::square},
        {"linear, N = 4, 4 rad/s", Color::vermillion, Marker::triangle}}};
