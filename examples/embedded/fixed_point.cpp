@@ -53,7 +53,7 @@ struct Integers {
   /// dhat in its unit.
   [[nodiscard]] double disturbance() const {
     const std::size_t last = code.written.scale.size() - 1;
-    return std::ldexp(static_cast<double>(player.word(last)) * code.written.estimates[last][last],
+    return std::ldexp(static_cast<double>(player.next_word(last)) * code.written.estimates[last][last],
                       -code.written.scale[last]);
   }
 
