@@ -80,7 +80,8 @@ class VariableTime
                     ? detail::unbounded<S>()
                     : static_cast<S>(made->max_gap() + 1) * chain.sample_time;
     }
-    if (const S nominal = chain_config<Observer>(config.observer).sample_time; longest < nominal) {
+    if (const S nominal = chain_config<Observer>(config.observer).sample_time;
+        !detail::at_most(nominal, longest)) {
       return Error<S>{"ratio",
                       config.ratio,
                       "allows steps of so different lengths that errors may grow; the longest step "
@@ -89,7 +90,8 @@ class VariableTime
                       longest,
                       true};
     }
-    return VariableTime(*observer, config, longest);
+    // Steps and their limits are rounded products.
+    return VariableTime(*observer, config, longest * (S(1) + S(4) * detail::rounding<S>()));
   }
 
   /// Sets the length of the next steps (s), until the next call. A length outside T / ratio .. T
@@ -98,10 +100,10 @@ class VariableTime
     const S nominal = chain_config<Observer>(config_.observer).sample_time;
     const S shortest = nominal / config_.ratio;
     const S longest = nominal * config_.ratio;
-    if (!is_finite(seconds) || seconds < shortest) {
+    if (!is_finite(seconds) || !detail::at_most(shortest, seconds)) {
       return Error<S>{"step_time", seconds, "must be finite and at least", -1, shortest, true};
     }
-    if (seconds > longest) {
+    if (!detail::at_most(seconds, longest)) {
       return Error<S>{"step_time", seconds, "must be at most", -1, longest, true};
     }
     step_time_ = seconds;
@@ -143,7 +145,7 @@ class VariableTime
   /// Whether it never restarts if every `steps`-th step has a measurement, whatever their lengths.
   [[nodiscard]] bool bridges(int steps) const noexcept {
     const S nominal = chain_config<Observer>(config_.observer).sample_time;
-    return !(static_cast<S>(steps) * (nominal * config_.ratio) > longest_);
+    return detail::at_most(S(static_cast<S>(steps) * (nominal * config_.ratio)), longest_);
   }
 
  private:
@@ -167,7 +169,9 @@ class VariableTime
   }
 
   [[nodiscard]] bool is_too_long() const noexcept {
-    return this->missed() != 0 && elapsed_ > longest_;
+    // The sum of the steps is rounded at each of them.
+    const S rounded = S(1) + static_cast<S>(this->missed()) * detail::rounding<S>();
+    return this->missed() != 0 && elapsed_ > longest_ * rounded;
   }
 
   /// The observer bridges a gap in `missed` equal steps: sets its sample time to their mean.

@@ -101,7 +101,7 @@ inline Check<double> check_frequency(double frequency, double sample_time) {
   return Rules<double>{}
       .not_negative("frequency", frequency)
       .demand(
-          !(sample_time > 0.0 && frequency > nyquist * (1.0 + 1e-12)),
+          !(sample_time > 0.0) || esokit::detail::at_most(frequency, nyquist),
           {"frequency", frequency, "must not be above the Nyquist frequency", -1, nyquist, true});
 }
 

@@ -145,7 +145,8 @@ inline Expected<LinearController, Error<double>> compensated(const LinearControl
   rules
       .demand(given.channels() == 1, "base.channels", given.channels(),
               "must be one, as the compensator has")
-      .demand(static_cast<float>(given.sample_time) == static_cast<float>(compensator.sample_time),
+      .demand(esokit::detail::same(static_cast<float>(given.sample_time),
+                                   static_cast<float>(compensator.sample_time)),
               {"base.sample_time", given.sample_time, "must be that of the compensator, which is",
                -1, compensator.sample_time, true});
   if (!rules) return rules.error();

@@ -47,9 +47,9 @@ Check<S> check_within(const char* field, const S& input, const Limits<S>& limits
   const bool nothing_said = !(input < S(0)) && !(input > S(0));
   return Rules<S>{}
       .finite(field, input)
-      .demand(nothing_said || !(input < limits.lower),
+      .demand(nothing_said || at_most(limits.lower, input),
               {field, input, "must not be below limits.lower", -1, limits.lower, true})
-      .demand(nothing_said || !(input > limits.upper),
+      .demand(nothing_said || at_most(input, limits.upper),
               {field, input, "must not be above limits.upper", -1, limits.upper, true});
 }
 

@@ -86,7 +86,7 @@ class Experiment {
     }
     const bool underway =
         phase_ == ExperimentPhase::approach || phase_ == ExperimentPhase::centring;
-    if (!underway && detail::absolute(from_rest) > config_.travel) {
+    if (!underway && !detail::at_most(detail::absolute(from_rest), config_.travel, y)) {
       return abort(goes_wrong(from_rest) ? AbortReason::wrong_sign : AbortReason::travel);
     }
     if (count_ >= limit_samples_) return abort(AbortReason::time_limit);
@@ -205,7 +205,8 @@ class Experiment {
   /// Looks at y in pieces of the time in which it at most moves by `response`.
   [[nodiscard]] bool too_fast(S y) noexcept {
     if (!(config_.fastest > S(0))) return false;
-    const bool fast = count_ > 1 && detail::absolute(S(y - piece_start_)) > config_.response;
+    const bool fast =
+        count_ > 1 && !detail::at_most(detail::absolute(S(y - piece_start_)), config_.response, y);
     if (count_ == 1 || count_ - piece_since_ >= piece_samples_) {
       piece_start_ = y;
       piece_since_ = count_;
@@ -217,10 +218,20 @@ class Experiment {
   void watch_from(S y) noexcept {
     watch_start_ = farthest_ = y;
     watched_since_ = count_;
-    // On the side of the safe u nothing can run away.
+    watching_ = response_samples_ > 0 && !safe_is_beyond();
+  }
+
+  /// True if the safe u leads at least as far as u does on this side: then nothing can run away.
+  [[nodiscard]] bool safe_is_beyond() const noexcept {
     const S safe = config_.safe_input.value_or(config_.input);
-    const S here = detail::absolute(S(moved(side_) - safe));
-    watching_ = response_samples_ > 0 && !(here < detail::absolute(S(moved(!side_) - safe)));
+    const S here = moved(side_), there = moved(!side_);
+    const S size = detail::absolute(safe) + detail::absolute(centre_);
+    if (phase_ == ExperimentPhase::approach || phase_ == ExperimentPhase::centring) {
+      // A machine that returns by itself may be slow: the nearer side is not watched.
+      return detail::below(detail::absolute(S(here - safe)), detail::absolute(S(there - safe)),
+                           size);
+    }
+    return here > there ? detail::at_most(here, safe, size) : detail::at_most(safe, here, size);
   }
 
   /// Why y does not follow u, if it does not.
@@ -229,7 +240,7 @@ class Experiment {
     const S back = way() * (y - watch_start_);
     if (first_move_ && !(back > -config_.response)) return AbortReason::wrong_sign;
     if (way() * (y - farthest_) < S(0)) farthest_ = y;
-    if (!(way() * (y - farthest_) < config_.response)) {
+    if (detail::at_most(config_.response, S(way() * (y - farthest_)), y)) {
       if (smallest_step_ > config_.response / S(2)) return AbortReason::resolution;
       watch_start_ = farthest_ = y;
       watched_since_ = count_;

@@ -135,9 +135,9 @@ void check_levels(Rules<S>& rules, const ExperimentConfig<S>& config) {
   const auto within = [&](const char* field, const S& value, const S& level, const char* above,
                           const char* below) {
     rules
-        .demand(is_finite(level) && !(level > config.limits.upper),
+        .demand(at_most(level, config.limits.upper, config.input),
                 {field, value, above, -1, config.limits.upper, true})
-        .demand(is_finite(level) && !(level < config.limits.lower),
+        .demand(at_most(config.limits.lower, level, config.input),
                 {field, value, below, -1, config.limits.lower, true});
   };
   if (config.safe_input) {
@@ -170,10 +170,11 @@ void check_levels(Rules<S>& rules, const ExperimentConfig<S>& config) {
               rises ? "highest_output" : "lowest_output",
               rises ? config.highest_output : config.lowest_output,
               "must be given with an approach")
-      .demand(config.lowest_output < approach.output - config.hysteresis &&
-                  approach.output + config.hysteresis < config.highest_output,
-              "approach.output", approach.output,
-              "must be between lowest_output and highest_output by more than the hysteresis");
+      .demand(
+          below(config.lowest_output, S(approach.output - config.hysteresis), approach.output) &&
+              below(S(approach.output + config.hysteresis), config.highest_output, approach.output),
+          "approach.output", approach.output,
+          "must be between lowest_output and highest_output by more than the hysteresis");
 }
 
 /// Refuses bad settings. @return the limiter of u
@@ -225,7 +226,7 @@ Expected<Limiter<S>, Error<S>> checked_experiment(const ExperimentConfig<S>& con
   const S samples = config.time_limit / T;
   check_levels<Order>(rules, config);
   rules
-      .demand(is_finite(samples) && samples < S(1 << 24), "time_limit", config.time_limit,
+      .demand(below(samples, S(1 << 24)), "time_limit", config.time_limit,
               "must be below 2^24 samples")
       .demand(config.rest < config.time_limit,
               {"rest", config.rest, "must be below time_limit", -1, config.time_limit, true})
@@ -238,18 +239,18 @@ Expected<Limiter<S>, Error<S>> checked_experiment(const ExperimentConfig<S>& con
         .demand(config.half_period < config.time_limit,
                 {"half_period", config.half_period, "must be below time_limit", -1,
                  config.time_limit, true})
-        .demand((std::round)(config.half_period / T) >= S(8), "half_period", config.half_period,
+        .demand(at_most(S(S(8) * T), config.half_period), "half_period", config.half_period,
                 "must be at least 8 samples");
   }
   if (config.response_time > S(0)) {
     rules
-        .demand((std::round)(config.response_time / T) >= S(1), "response_time",
-                config.response_time, "must be at least one sample")
+        .demand(at_most(T, config.response_time), "response_time", config.response_time,
+                "must be at least one sample")
         .demand(config.response_time < config.time_limit,
                 {"response_time", config.response_time, "must be below time_limit", -1,
                  config.time_limit, true});
   }
-  rules.demand(!(config.fastest * T > config.response),
+  rules.demand(at_most(S(config.fastest * T), config.response),
                {"fastest", config.fastest, "must be at most response in a sample:", -1,
                 config.response / T, true});
   const S power = Order == 1 ? T : S(T * T);

@@ -68,10 +68,10 @@ class GainProbe {
     if (!rules) return rules.error();
     const S x = config.observer_bandwidth * config.sample_time;
     rules
-        .demand(!(x > S(1)), {"observer_bandwidth", config.observer_bandwidth,
-                              "times sample_time must be at most", -1, S(1), true})
-        .demand(S(5) / x < S(1 << 24), "observer_bandwidth", config.observer_bandwidth,
-                "makes half a period longer than 2^24 samples");
+        .demand(detail::at_most(x, S(1)), {"observer_bandwidth", config.observer_bandwidth,
+                                           "times sample_time must be at most", -1, S(1), true})
+        .demand(detail::below(S(S(5) / x), S(1 << 24)), "observer_bandwidth",
+                config.observer_bandwidth, "makes half a period longer than 2^24 samples");
     if (!rules) return rules.error();
     const auto limiter = Limiter<S>::make(config.limits, config.sample_time);
     if (!limiter) return limiter.error();

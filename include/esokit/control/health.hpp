@@ -173,10 +173,10 @@ class HealthMonitor {
     if (!rules) return rules.error();
     const S step = config.sample_time * static_cast<S>(config.divider);
     rules
-        .demand(!(config.observer_bandwidth * step > S(1)),
+        .demand(detail::at_most(S(config.observer_bandwidth * step), S(1)),
                 {"divider", static_cast<S>(config.divider),
                  "is too large: omega_o T D must be at most", -1, S(1), true})
-        .demand(!(config.memory < S(8) / config.observer_bandwidth),
+        .demand(detail::at_most(S(S(8) / config.observer_bandwidth), config.memory),
                 {"memory", config.memory, "must be at least 8 / omega_o, that is", -1,
                  S(8) / config.observer_bandwidth, true});
     if (!rules) return rules.error();

@@ -317,7 +317,7 @@ class MimoAdrc {
     if (!is_finite(inverse.sum()) || !is_finite(condition)) {
       condition = detail::unbounded<S>();
     }
-    if (!is_finite(condition) || condition > condition_limit) {
+    if (!detail::at_most(condition, condition_limit)) {
       return Error<S>{"input_matrix",
                       condition,
                       "has a condition number (the value here) that must be at most",
@@ -379,7 +379,7 @@ class MimoAdrc {
     if (chain.input_gain < S(0) || chain.input_gain > S(0) || !is_finite(chain.input_gain)) {
       return Error<S>{"input_gain", chain.input_gain, "is given by input_matrix: leave it out"};
     }
-    if (chain.sample_time < sample_time || chain.sample_time > sample_time) {
+    if (!detail::same(chain.sample_time, sample_time)) {
       return Error<S>{
           "sample_time", chain.sample_time, "must be the same in all channels, as", -1, sample_time,
           true};

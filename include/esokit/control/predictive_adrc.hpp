@@ -279,7 +279,8 @@ class PredictiveAdrc {
     const S samples = seconds / sample_time - S(1e-3);
     Rules<S> rules;
     rules.not_negative("start_hold", seconds)
-        .demand(all(samples < S(1e6)), "start_hold", seconds, "must be 1e6 samples or less");
+        .demand(detail::at_most(S(seconds / sample_time), S(1e6)), "start_hold", seconds,
+                "must be 1e6 samples or less");
     if (!rules) return rules.error();
     std::uint32_t count = 0;
     while (!all(detail::integer<S>(count) >= samples)) ++count;

@@ -47,6 +47,29 @@ constexpr bool all_finite(const Matrix<S, Rows, Columns>& matrix) noexcept {
   return true;
 }
 
+/// value <= limit, where one of them was computed from other numbers. Settings that are exactly at
+/// a limit in decimals are so in binary but for a few roundings: four, of the largest number that
+/// went into it. What must not be passed is clamped afterwards.
+/// @param size the largest number that went into them, if they are smaller than it
+template <Scalar S>
+[[gnu::__noinline__]] constexpr bool at_most(const S& value, const S& limit,
+                                             const S& size = S(0.0)) noexcept {
+  if (!all(is_finite(value))) return false;
+  if (all(value <= limit)) return true;
+  const S largest = upper_one(upper_one(absolute(value), absolute(limit)), absolute(size));
+  return all(value - limit <= S(4.0) * rounding<S>() * largest);
+}
+/// value < limit, so that what is at the limit in decimals is refused.
+template <Scalar S>
+constexpr bool below(const S& value, const S& limit, const S& size = S(0.0)) noexcept {
+  return all(is_finite(value)) && !at_most(limit, value, size);
+}
+/// The same number, perhaps computed in two ways.
+template <Scalar S>
+constexpr bool same(const S& a, const S& b) noexcept {
+  return at_most(a, b) && at_most(b, a);
+}
+
 /// A normal number, neither infinite nor lost in the subnormals.
 template <Scalar S>
 constexpr bool normal(const S& value) {

@@ -43,13 +43,13 @@ class MeasuredPath {
     return Rules<S>{}
         .finite("inputs.gain", input.gain, index)
         .not_negative("inputs.lag", input.lag, index)
-        .demand(input.lag <= S(1e6) * time,
+        .demand(at_most(input.lag, S(S(1e6) * time)),
                 {"inputs.lag", input.lag, "must be at most a million samples, s:", index,
                  S(1e6) * time, true})
         .not_negative("inputs.dead_time", input.dead_time, index)
-        .demand(input.dead_time <= longest(time),
+        .demand(at_most(input.dead_time, longest(time)),
                 {"inputs.dead_time", input.dead_time, "must be at most Capacity samples, s:", index,
-                 static_cast<S>(Capacity) * time, true});
+                 longest(time), true});
   }
 
   /// Other settings, the same memory.
@@ -125,7 +125,7 @@ class MeasuredPath {
  private:
   friend struct RecordAccess;
   static constexpr int length = Capacity + 2;
-  static S longest(const S& time) { return (static_cast<S>(Capacity) + S(1) / S(1024)) * time; }
+  static S longest(const S& time) { return static_cast<S>(Capacity) * time; }
 
   [[nodiscard]] Course course() const noexcept {
     return course(lagged_, before(whole_ + 1), before(whole_));

@@ -184,7 +184,7 @@ template <PlainScalar S>
 void check_lag(Rules<S>& rules, const char* field, const char*, const Lag<1, S>& lag,
                const S& time) {
   rules.positive(field, lag.time_constant)
-      .demand(lag.time_constant * S(100) >= time, field, lag.time_constant,
+      .demand(at_most(time, S(lag.time_constant * S(100))), field, lag.time_constant,
               "must be at least a hundredth of sample_time");
 }
 template <PlainScalar S>
@@ -195,9 +195,9 @@ void check_lag(Rules<S>& rules, const char* field, const char* damping, const La
       lag.damping > S(1) ? S(lag.damping + std::sqrt(lag.damping * lag.damping - S(1))) : S(1);
   rules.positive(field, lag.frequency)
       .positive(damping, lag.damping)
-      .demand(lag.frequency * time <= S(100), field, lag.frequency,
+      .demand(at_most(S(lag.frequency * time), S(100)), field, lag.frequency,
               "must be at most a hundred times the sample rate")
-      .demand(spread * lag.frequency * time <= S(100), damping, lag.damping,
+      .demand(at_most(S(spread * lag.frequency * time), S(100)), damping, lag.damping,
               "gives a time constant below a hundredth of sample_time");
 }
 /// @}
@@ -211,7 +211,7 @@ void check_sensor(Rules<S>& rules, const Lag<Order, S>& sensor, const S& time) {
 /// Element `index` must differ from those before it, of which `other` is one.
 template <PlainScalar S>
 void check_apart(Rules<S>& rules, const char* field, const S& value, int index, const S& other) {
-  rules.demand(absolute(S(value - other)) > S(1e-3) * value,
+  rules.demand(below(S(S(1e-3) * value), absolute(S(value - other)), other),
                {field, value, "must differ by a thousandth of itself from", index, other, true});
 }
 
@@ -222,7 +222,7 @@ void check_resonators(Rules<S>& rules, const std::array<Resonance<S>, Sines>& re
     const auto& resonance = resonators[i];
     const auto c = static_cast<int>(i);
     rules.positive("model.resonators.frequency", resonance.frequency, c)
-        .demand(resonance.frequency * time < S(3.1), "model.resonators.frequency",
+        .demand(below(S(resonance.frequency * time), S(3.1)), "model.resonators.frequency",
                 resonance.frequency, "must be below half the sample rate", c)
         .demand(
             is_finite(resonance.damping) && resonance.damping >= S(0) && resonance.damping < S(1),
@@ -242,7 +242,7 @@ void check_first_order(Rules<S>& rules, const std::array<S, FirstOrders>& first_
     const S& tau = first_order[i];
     const auto c = static_cast<int>(i);
     rules.positive("model.first_order", tau, c)
-        .demand(tau * S(100) >= time, "model.first_order", tau,
+        .demand(at_most(time, S(tau * S(100))), "model.first_order", tau,
                 "must be at least a hundredth of sample_time", c);
     for (std::size_t before = 0; before < i; ++before) {
       check_apart(rules, "model.first_order", tau, c, first_order[before]);

@@ -144,8 +144,8 @@ Check<S> check_parts(const PartsSettings<Parts, S>& settings, const S& time) {
         .demand(lowest <= S(1), "model.speed.lowest", lowest, "must be 1 at most")
         .demand(highest >= S(1), "model.speed.highest", highest, "must be 1 or more");
     for (const auto& resonance : settings.resonators) {
-      rules.demand(highest * resonance.frequency * time < S(3.1), "model.speed.highest", highest,
-                   "takes a resonator to half the sample rate");
+      rules.demand(below(S(highest * resonance.frequency * time), S(3.1)), "model.speed.highest",
+                   highest, "takes a resonator to half the sample rate");
     }
   }
   check_first_order(rules, settings.first_order, time);

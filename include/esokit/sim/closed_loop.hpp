@@ -278,11 +278,11 @@ struct SampledLoop {
     const auto given = static_cast<typename Observer::scalar_type>(config.sample_time);
     Rules<ScalarType> rules;
     rules.positive("sample_time", config.sample_time)
-        .demand(!(given < own || given > own), {.field = "sample_time",
-                                                .value = config.sample_time,
-                                                .rule = "must be that of the observer, which is",
-                                                .limit = static_cast<ScalarType>(own),
-                                                .has_limit = true});
+        .demand(esokit::detail::same(given, own), {.field = "sample_time",
+                                                   .value = config.sample_time,
+                                                   .rule = "must be that of the observer, which is",
+                                                   .limit = static_cast<ScalarType>(own),
+                                                   .has_limit = true});
     if (!rules) return rules.error();
     const auto samples =
         detail::whole_multiple("duration", config.duration, config.sample_time,

@@ -109,7 +109,7 @@ Expected<typename RunTypes<P, C>::Time, Error<typename RunTypes<P, C>::Time>> ru
     for (int i = 0; i < lane_count<Own>; ++i) {
       const OwnTime in_lane = esokit::detail::number_of_lane(own, i);
       const auto asked = static_cast<OwnTime>(given);
-      rules.demand(!(asked < in_lane || asked > in_lane),
+      rules.demand(esokit::detail::same(asked, in_lane),
                    {"sample_time", given, "must be that of the controller, which is", -1,
                     static_cast<Time>(in_lane), true});
     }

@@ -410,14 +410,14 @@ requires ControllerOf<C, P> Expected<RunEnd<P, C>, Error<typename RunTypes<P, C>
     const Time first = esokit::detail::number_of_lane(plant.dead_time, 0);
     for (int i = 1; i < lane_count<S>; ++i) {
       const Time other = esokit::detail::number_of_lane(plant.dead_time, i);
-      rules.demand(!(other < first || other > first), "dead_time", other,
+      rules.demand(esokit::detail::same(other, first), "dead_time", other,
                    "must be the same in all lanes");
     }
     dead_time += first;
   }
   const bool even = !(config.jitter > Time(0)) && !config.step_time;
   const Time shortest = even ? T : T / Time(10);
-  rules.demand(dead_time / shortest < Time(1e6), "dead_time", dead_time,
+  rules.demand(esokit::detail::below(Time(dead_time / shortest), Time(1e6)), "dead_time", dead_time,
                "must be below 1e6 samples (1e5 with jitter)");
   if (!rules) return rules.error();
 

@@ -381,7 +381,7 @@ class FixedDesign : public FixedBuilder {
   bool judges_input() {
     const double most = options_.most_input_deviation > 0 ? options_.most_input_deviation
                                                           : (std::max)(input.half_count, 1.0);
-    if (rate > 0 && std::ldexp(rate, law_scale) < 64) {
+    if (rate > 0 && !at_most(64.0, std::ldexp(rate, law_scale))) {
       refusal = {
           "limits.rate",
           rate,

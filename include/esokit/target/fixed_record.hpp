@@ -292,17 +292,18 @@ class FixedRecord {
   bool takes_limits() {
     lower = design_->lower / options_.u.unit;
     upper = design_->upper / options_.u.unit;
-    const double most = options_.u.most;
-    if (!(lower >= -most) || !(upper <= most)) {
-      return refuse("u.most", most, "must hold the limits of the controller in counts");
-    }
+    const double digit = design_->single ? double{rounding<float>()} : rounding<double>();
     for (const double count : {lower, upper}) {
-      if (std::fabs(count - std::nearbyint(count)) > 1e-6) {
+      if (std::fabs(count - std::nearbyint(count)) > 1e-6 + 4 * digit * std::fabs(count)) {
         return refuse("u.unit", count, "must make the limits of the controller whole counts");
       }
     }
     lower = std::nearbyint(lower);
     upper = std::nearbyint(upper);
+    const double most = options_.u.most;
+    if (!(lower >= -most) || !(upper <= most)) {
+      return refuse("u.most", most, "must hold the limits of the controller in counts");
+    }
     // A step as large as the range limits nothing.
     if (design_->rate < design_->upper - design_->lower) rate = design_->rate / options_.u.unit;
     const LinearCall forms = linear(called("law"), {column});

@@ -80,7 +80,8 @@ struct TuneModel {
                    "must be between 1e-60 and 1e60: use another unit");
     };
     const auto lag_fits = [&](const char* field, double value) {
-      rules.demand(!(value > 0.0) || (value >= 1e-9 * sample_time && value <= 1e6 * sample_time),
+      rules.demand(!(value > 0.0) || (esokit::detail::at_most(1e-9 * sample_time, value) &&
+                                      esokit::detail::at_most(value, 1e6 * sample_time)),
                    field, value, "must be 0, or between 1e-9 and 1e6 samples");
     };
     rules.demand(order >= 1 && order <= 3, "order", static_cast<double>(order), "must be 1, 2 or 3")
@@ -103,13 +104,13 @@ struct TuneModel {
         .demand(u_min < u_max, "u_max", u_max, "must be above u_min")
         .demand(sinusoids.size() <= 1, "sinusoids", static_cast<double>(sinusoids.size()),
                 "must be one at most")
-        .demand(!(dead_time > 100.0 * sample_time), "dead_time", dead_time,
+        .demand(esokit::detail::at_most(dead_time, 100.0 * sample_time), "dead_time", dead_time,
                 "must not be above 100 samples")
-        .demand(!(latency_half_width > 100.0 * sample_time), "latency_half_width",
-                latency_half_width, "must not be above 100 samples")
+        .demand(esokit::detail::at_most(latency_half_width, 100.0 * sample_time),
+                "latency_half_width", latency_half_width, "must not be above 100 samples")
         .demand(sample_time >= 1e-12 && sample_time <= 1e12, "sample_time", sample_time,
                 "must be between 1e-12 s and 1e12 s")
-        .demand(!((std::abs)(pole)*sample_time > 100.0), "pole", pole,
+        .demand(esokit::detail::at_most((std::abs)(pole)*sample_time, 100.0), "pole", pole,
                 "must be at most a hundred times the sample rate")
         .demand((std::abs)(u_min) <= 1e60, "u_min", u_min, "is too large: use another unit")
         .demand((std::abs)(u_max) <= 1e60, "u_max", u_max, "is too large: use another unit");
@@ -122,15 +123,18 @@ struct TuneModel {
     lag_fits("lag", lag);
     lag_fits("sensor", sensor);
     // Beyond this limit the criterion is a difference of numbers that agree to the last digit.
-    rules.demand(filter_bandwidth() * sample_time >= 1e-6, "disturbance", disturbance,
+    rules.demand(esokit::detail::at_most(1e-6, filter_bandwidth() * sample_time), "disturbance",
+                 disturbance,
                  "is so small for this noise that an observer would need a million samples");
     for (std::size_t i = 0; i < sinusoids.size(); ++i) {
       const int index = static_cast<int>(i);
       rules.positive("sinusoids.frequency", sinusoids[i].frequency, index)
-          .demand(sinusoids[i].frequency * sample_time < 3.1, "sinusoids.frequency",
-                  sinusoids[i].frequency, "must be below half the sample rate", index)
-          .demand(sinusoids[i].frequency * sample_time >= 1e-9, "sinusoids.frequency",
-                  sinusoids[i].frequency, "must be at least 1e-9 of the sample rate", index)
+          .demand(esokit::detail::below(sinusoids[i].frequency * sample_time, 3.1),
+                  "sinusoids.frequency", sinusoids[i].frequency,
+                  "must be below half the sample rate", index)
+          .demand(esokit::detail::at_most(1e-9, sinusoids[i].frequency * sample_time),
+                  "sinusoids.frequency", sinusoids[i].frequency,
+                  "must be at least 1e-9 of the sample rate", index)
           .not_negative("sinusoids.amplitude", sinusoids[i].amplitude, index)
           .demand(!(sinusoids[i].amplitude > 1e60), "sinusoids.amplitude", sinusoids[i].amplitude,
                   "is too large: use another unit", index)

@@ -439,11 +439,12 @@ template <TuneKnowledge Parts = tune_knows_all>
   if (wish.controller_bandwidth > 0.0) {
     w = wish.controller_bandwidth;
     checks
-        .demand(w <= fast, {"controller_bandwidth", w,
-                            "must not be above half the sample rate, which is", -1, fast, true})
-        .demand(w * T >= 1e-6, "controller_bandwidth", w,
+        .demand(detail::at_most(w, fast),
+                {"controller_bandwidth", w, "must not be above half the sample rate, which is", -1,
+                 fast, true})
+        .demand(detail::at_most(1e-6, w * T), "controller_bandwidth", w,
                 "must be at least 1e-6 of the sample rate")
-        .demand(w <= 2.0 * damped,
+        .demand(detail::at_most(w, 2.0 * damped),
                 {"controller_bandwidth", w,
                  "is so fast for this latency that the loop would swing at its limits for ever; "
                  "must be at most",
@@ -454,15 +455,15 @@ template <TuneKnowledge Parts = tune_knows_all>
     const double safe = (std::min)(fast, 2.0 * damped);
     checks
         .demand(
-            shortest(fast) <= wish.settling_time,
+            detail::at_most(shortest(fast), wish.settling_time),
             {"settling_time", wish.settling_time,
              "is shorter than sample time and dead time allow, which is", -1, shortest(fast), true})
-        .demand(shortest(safe) <= wish.settling_time,
+        .demand(detail::at_most(shortest(safe), wish.settling_time),
                 {"settling_time", wish.settling_time,
                  "is so short for this latency that the loop would swing at its limits for ever; "
                  "must be at least",
                  -1, shortest(safe), true})
-        .demand(shortest(slow) >= wish.settling_time,
+        .demand(detail::at_most(wish.settling_time, shortest(slow)),
                 {"settling_time", wish.settling_time,
                  "is far slower than the disturbance; must be at most", -1, shortest(slow), true});
     if (!checks) return checks.error();
