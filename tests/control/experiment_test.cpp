@@ -1046,5 +1046,77 @@ TEST(Experiment, HandsOverWithoutABump) {
   EXPECT_GT(std::abs(started.update(y, 0.0) - asked), 2 * share);
 }
 
+/// A sensor that stands still, from the start or after the first switch, is noticed on both sides
+/// for every u0 and A; so it is where the safe u is u0, computed in another way, or between the
+/// two.
+template <class S>
+void is_watched_on_both_sides() {
+  Random random(47);
+  for (int i = 0; i < 3000; i += stride) {
+    const int places = i % 3 == 0 ? 1 : 2;
+    const S scale = places == 1 ? S(10) : S(100);
+    const S u0 = static_cast<S>(random.index(399) - 199) / scale;
+    const S size = static_cast<S>(1 + random.index(399)) / scale;
+    const S A = random.index(2) == 0 ? size : -size;
+    ExperimentConfig<S> config{.sample_time = S(0.01),
+                               .excitation = Excitation::steps,
+                               .input = u0,
+                               .amplitude = A,
+                               .half_period = S(4),
+                               .response = size,
+                               .response_time = S(1.5),
+                               .travel = S(1000),
+                               .time_limit = S(60),
+                               .limits = {.lower = S(-100), .upper = S(100)}};
+    const int safe = random.index(3);
+    if (safe == 1) config.safe_input = (u0 + S(0.1)) - S(0.1);
+    if (safe == 2) config.safe_input = u0 + static_cast<S>(random.uniform(-0.9, 0.9)) * size;
+    auto one = Experiment<1, S>::make(config).value();
+    const bool later = random.index(2) == 0;
+    double y = 20;
+    double seen = 20;
+    double since = 0;
+    bool stuck = !later;
+    while (!one.finished()) {
+      const double u = static_cast<double>(one.update(static_cast<S>(seen)));
+      if (one.finished()) break;
+      // The machine follows, the sensor stands still from the first time below y0 on.
+      y += 0.01 * (A > S(0) ? 1 : -1) * (u - static_cast<double>(u0));
+      if (later && one.samples() == 205) stuck = true;
+      if (!stuck) seen = y;
+      if (stuck) since += 0.01;
+    }
+    EXPECT_EQ(one.reason(), AbortReason::no_response) << u0 << ", " << A << ", safe " << safe;
+    EXPECT_LT(since, 1.6) << u0 << ", " << A << ", later " << later;
+  }
+}
+
+TEST(Experiment, IsWatchedOnBothSides) {
+  is_watched_on_both_sides<double>();
+  is_watched_on_both_sides<float>();
+}
+
+/// Where the safe u leads as far or further nothing can run away: the cold machine.
+TEST(Experiment, IsNotWatchedWhereTheSafeInputLeadsFurther) {
+  for (const double safe : {0.1, -0.3}) {
+    ExperimentConfig<double> config = steps();
+    config.input = 0.3;
+    config.amplitude = 0.2;
+    config.half_period = 1;
+    config.response = 0.02;
+    config.response_time = 0.4;
+    config.time_limit = 30;
+    config.safe_input = safe;  // 0.3 - 0.2 is 0.09999999999999998
+    auto one = Experiment<1>::make(config).value();
+    double y = 0;
+    // Moves up at once, and down only by its own.
+    for (int k = 0; k < 3000 && !one.finished(); ++k) {
+      const double u = one.update(y);
+      y += 1e-3 * (u > 0.3 ? 0.2 : -0.01);
+    }
+    EXPECT_NE(one.reason(), AbortReason::no_response) << safe;
+  }
+}
+
 }  // namespace control_experiment_test
 }  // namespace esokit_test

@@ -40,10 +40,11 @@ namespace esokit {
 /// measured cycles move u around that, with a hysteresis of at least what y moves in the latency.
 ///
 /// Limits are those of y, of y' (`fastest`), of u and of time. Whatever happens ends within
-/// `time_limit` with a `reason`, and with the safe u. While u is on
-/// the side that drives y away from where the safe u leads, y has to follow it by `response` in
-/// each `response_time`: so a sensor that stands still is noticed within that time, in which u may
-/// move y by b0 A times it: leave as much room. On the other side only `time_limit` ends it. No u
+/// `time_limit` with a `reason`, and with the safe u. Where u drives y further than the safe u does
+/// (with safe u = u0 on both sides), y has to follow it by `response` in each `response_time`: so a
+/// sensor that stands still is noticed within that time, in which u may move y by b0 A times it:
+/// leave as much room. On a side where the safe u leads as far or further, only `time_limit` ends
+/// it; during approach and centring on the side that is nearer to the safe u. No u
 /// stops a machine of order 2 in its motion, nor holds one that was turned on by something else:
 /// that is for brakes and end stops.
 ///
@@ -86,7 +87,7 @@ class Experiment {
     }
     const bool underway =
         phase_ == ExperimentPhase::approach || phase_ == ExperimentPhase::centring;
-    if (!underway && !detail::at_most(detail::absolute(from_rest), config_.travel, y)) {
+    if (!underway && detail::absolute(from_rest) > config_.travel) {
       return abort(goes_wrong(from_rest) ? AbortReason::wrong_sign : AbortReason::travel);
     }
     if (count_ >= limit_samples_) return abort(AbortReason::time_limit);
@@ -205,8 +206,7 @@ class Experiment {
   /// Looks at y in pieces of the time in which it at most moves by `response`.
   [[nodiscard]] bool too_fast(S y) noexcept {
     if (!(config_.fastest > S(0))) return false;
-    const bool fast =
-        count_ > 1 && !detail::at_most(detail::absolute(S(y - piece_start_)), config_.response, y);
+    const bool fast = count_ > 1 && detail::absolute(S(y - piece_start_)) > config_.response;
     if (count_ == 1 || count_ - piece_since_ >= piece_samples_) {
       piece_start_ = y;
       piece_since_ = count_;
@@ -240,7 +240,7 @@ class Experiment {
     const S back = way() * (y - watch_start_);
     if (first_move_ && !(back > -config_.response)) return AbortReason::wrong_sign;
     if (way() * (y - farthest_) < S(0)) farthest_ = y;
-    if (detail::at_most(config_.response, S(way() * (y - farthest_)), y)) {
+    if (!(way() * (y - farthest_) < config_.response)) {
       if (smallest_step_ > config_.response / S(2)) return AbortReason::resolution;
       watch_start_ = farthest_ = y;
       watched_since_ = count_;

@@ -48,8 +48,8 @@ constexpr bool all_finite(const Matrix<S, Rows, Columns>& matrix) noexcept {
 }
 
 /// value <= limit, where one of them was computed from other numbers. Settings that are exactly at
-/// a limit in decimals are so in binary but for a few roundings: four, of the largest number that
-/// went into it. What must not be passed is clamped afterwards.
+/// a limit in decimals are so in binary but for a few roundings: six halves of a digit, of the
+/// largest number that went into it. What must not be passed is clamped afterwards.
 /// @param size the largest number that went into them, if they are smaller than it
 template <Scalar S>
 [[gnu::__noinline__]] constexpr bool at_most(const S& value, const S& limit,
@@ -57,7 +57,7 @@ template <Scalar S>
   if (!all(is_finite(value))) return false;
   if (all(value <= limit)) return true;
   const S largest = upper_one(upper_one(absolute(value), absolute(limit)), absolute(size));
-  return all(value - limit <= S(4.0) * rounding<S>() * largest);
+  return all(value - limit <= S(3.0) * rounding<S>() * largest);
 }
 /// value < limit, so that what is at the limit in decimals is refused.
 template <Scalar S>
