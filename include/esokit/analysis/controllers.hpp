@@ -186,9 +186,9 @@ namespace detail {
 template <Scalar A, Scalar B>
 bool same_as_given(double a, double b) noexcept {
   if constexpr (std::is_same_v<A, float> || std::is_same_v<B, float>) {
-    return same(static_cast<float>(a), static_cast<float>(b));
+    return static_cast<float>(a) == static_cast<float>(b);
   } else {
-    return same(a, b);
+    return a == b;
   }
 }
 
