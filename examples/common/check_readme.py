@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """Checks the numbers of pages against what the examples wrote: check_readme.py OUT [--write] PAGE...
+With --pages instead of OUT only those that come from other pages, which needs no run.
 
 A number of a page that comes from a run has a source. It stands in a comment after the number, with
 one source for each of the last numbers of the line before it:
@@ -27,8 +28,8 @@ A source is one of
 EXAMPLE is a folder below OUT/FOLDER, where FOLDER is that of the page (for pages of the top folder
 and of examples/, below OUT). In the other names * and ? match any text; write ? for a bar, because a
 row of a Markdown table must not contain one. Several rows may match: then the largest number counts,
-with `min` before the source the smallest. `error` before it takes the largest relative error in %
-instead; `A over B` is the quotient of two sources, and `* FACTOR` at the end multiplies. The number
+with `min` before the source the smallest, with `sum` the sum. `error` before it takes the largest relative
+error in % instead; `A over B` is the quotient of two sources, and `* FACTOR` at the end multiplies. The number
 in the page must agree in its last printed digit; with `<=` before the source it must only not be
 exceeded. A number in words ("five programs") has a source where its piece has no digits.
 
@@ -56,10 +57,10 @@ WORDS = {word: n for n, word in enumerate(
 WORD = re.compile(r"\b(?:" + "|".join(WORDS) + r")\b", re.IGNORECASE)
 COMMENT = re.compile(r"<!--=(.*?)-->", re.DOTALL)
 # What a page shows that no reader takes for a statement of it.
-NOT_TEXT = re.compile(r"^```.*?^```|<!--.*?-->|`[^`\n]*`|\]\([^)]*\)|https?://\S+|^ *\d+\. ",
+NOT_TEXT = re.compile(r"^```.*?^```|^    [^\n]*|<!--.*?-->|`[^`\n]*`|\]\([^)]*\)|https?://\S+|^ *\d+\. ",
                       re.DOTALL | re.MULTILINE)
 SOURCE = re.compile(
-    r"(?:(?P<mode>max|min|error) )?(?P<example>[^:#]+)(?:#(?P<table>[^:]+))?:"
+    r"(?:(?P<mode>max|min|sum|error) )?(?P<example>[^:#]+)(?:#(?P<table>[^:]+))?:"
     r"(?P<row>.*) -> (?P<column>.*)", re.DOTALL)
 COUNTED = re.compile(r"(?P<what>lines|files) (?P<path>\S+)")
 
@@ -133,7 +134,7 @@ def one_value(text, folder):
     values = [value for value in values if value is not None]
     if not values:
         raise ValueError("names no row")
-    return (min if mode == "min" else max)(values)
+    return {"min": min, "sum": sum}.get(mode, max)(values)
 
 
 def value_of(source, folder):
@@ -248,13 +249,16 @@ def agrees(value, most, printed):
 
 def out_folder(out, page):
     """Where the examples of a page are: OUT/FOLDER, or OUT for a page of all (FOLDER/EXAMPLE)."""
-    folder = out / page.resolve().parent.name
-    return folder if folder.is_dir() else out
+    folder = out and out / page.resolve().parent.name
+    return folder if folder and folder.is_dir() else out
 
 
 def check(out, page, write=False):
-    """How many numbers of a page are right and wrong; says what is wrong."""
+    """How many numbers of a page are right and wrong; says what is wrong. Without `out` only those
+    of other pages."""
     found, problems = sourced(page)
+    if not out:
+        found = [one for one in found if ".md#" in one.source]
     text, changes, right = page.read_text(encoding="utf-8"), [], 0
     for one in found:
         try:
@@ -342,6 +346,7 @@ def self_test():
     expect("exceeded", f"0.09 <!--= <= {a} -->", None, 1)
     expect("not exceeded", f"0.1 <!--= <= {a} -->", None, 0)
     expect("a factor", f"97.2 <!--= {a} * 1000 -->", None, 0)
+    expect("a sum", f"0.4972, 0.0972 <!--= sum one: * -> m; min one: * -> m -->", None, 0)
     expect("a quotient", f"4.12 <!--= {b} over {a} -->", None, 0)
     expect("a wrong quotient", f"4.11 <!--= {b} over {a} -->", None, 1)
     expect("a file", "It is 0.097, set by 3.", f"It is 0.097 <!--= {a} -->\nset by 3\n", 0)
@@ -369,12 +374,13 @@ def self_test():
 def main():
     if sys.argv[1:] == ["--self-test"]:
         sys.exit(0 if self_test() else 1)
-    arguments = [argument for argument in sys.argv[1:] if argument != "--write"]
-    if len(arguments) < 2:
-        sys.exit(__doc__.splitlines()[0])
+    arguments = [argument for argument in sys.argv[1:] if argument not in ("--write", "--pages")]
+    out = None if "--pages" in sys.argv or not arguments else Path(arguments.pop(0))
+    if not arguments:
+        sys.exit("\n".join(__doc__.splitlines()[:2]))
     passed = failed = 0
-    for page in map(Path, arguments[1:]):
-        right, wrong = check(Path(arguments[0]), page, "--write" in sys.argv)
+    for page in map(Path, arguments):
+        right, wrong = check(out, page, "--write" in sys.argv)
         passed, failed = passed + right, failed + wrong
     print(f"{passed} passed, {failed} failed")
     sys.exit(0 if passed and not failed else 1)

@@ -195,6 +195,7 @@ def same(was, now):
 def main():
     out, write = Path(sys.argv[1]), "--write" in sys.argv[2:]
     passed = failed = 0
+    front = (Path(__file__).resolve().parents[2] / "README.md").read_text()
     for picture in sorted(Path(__file__).resolve().parents[1].glob("*/*.svg")):
         name = f"{picture.parent.name}/{picture.name}"
         drawn = list((out / picture.parent.name).glob(f"*/{picture.name}"))
@@ -209,8 +210,9 @@ def main():
                 wrong = "not what the examples draw now: examples/common/pictures.py OUT --write"
             elif picture.stat().st_size > MOST:
                 wrong = f"{picture.stat().st_size} bytes, more than {MOST}: draw less"
-        if not wrong and not (picture.parent / "README.md").read_text().count(f"]({picture.name})"):
-            wrong = "not shown in the README of its folder"
+        if not wrong and not ((picture.parent / "README.md").read_text().count(f"]({picture.name})") or
+                              front.count(f"](examples/{name})")):
+            wrong = "shown neither in the README of its folder nor in that of the project"
         if wrong:
             print(f"{name}: {wrong}")
         passed, failed = passed + (not wrong), failed + bool(wrong)

@@ -1,15 +1,17 @@
 #!/usr/bin/env bash
 # Builds the firmware of this folder for four microcontrollers, runs it in an emulator, compares it
-# with the host, checks what was linked, and writes the table into README.md. See usage below.
+# with the host, checks what was linked, and compares the tables of README.md. See usage below.
 set -euo pipefail
 folder=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)
 root=$(cd -- "$folder/../.." && pwd)
 
 usage() {
   cat <<'END'
-usage: examples/embedded/run.sh [--no-install] [--self-test | --paste]
+usage: examples/embedded/run.sh [--no-install] [--write | --self-test | --paste]
 
   --no-install   do not install missing Debian packages, only name them (status 3)
+  --write        write the tables into README.md instead of comparing them, and the numbers that
+                 other pages take from them
   --self-test    instead: see the checks refuse what they are there to refuse
   --paste        instead: write firmware/pasted.hpp, the design that the host makes
   --help         this text
@@ -21,9 +23,11 @@ END
 no_install=()
 self_test=no
 paste=no
+write=no
 for option in "$@"; do
   case $option in
     --no-install) no_install=(--no-install) ;;
+    --write) write=yes ;;
     --self-test) self_test=yes ;;
     --paste) paste=yes ;;
     -h | --help)
@@ -247,6 +251,14 @@ check_links() {
   done
 }
 
+# with_table PAGE TABLE: the page with these tables
+with_table() {
+  awk -v table="$2" '
+    /^<!-- table/ { print; while ((getline line < table) > 0) print line; print ""; inside = 1 }
+    /^<!-- end of table/ { inside = 0 }
+    !inside' "$1"
+}
+
 host_run() {
   mkdir -p "$out/written" &&
     build firmware-host firmware_exact drive compare_runs write_c fixed_bounds &&
@@ -301,6 +313,16 @@ if [[ $self_test == yes ]]; then
     sed 's/^FAILED/ok     refused: a limit that is/' "$out/limits.txt"
   else
     fail "a limit does not bind"
+  fi
+  # A page with another number.
+  sed '/^| LinearEso<2> /s/[0-9][0-9]* |$/1 |/' "$folder/README.md" >"$out/stale.md"
+  sed -n '/^<!-- table/,/^<!-- end of table/p' "$folder/README.md" | sed '1d;$d' | sed '$d' >"$out/stale_table.md"
+  if with_table "$folder/README.md" "$out/stale_table.md" | cmp -s - "$folder/README.md" &&
+    ! with_table "$out/stale.md" "$out/stale_table.md" | cmp -s - "$out/stale.md"; then
+    pass
+    echo "ok     refused: a page whose table is not that of the run"
+  else
+    fail "a page with another number in its table is not refused"
   fi
   finish
 fi
@@ -373,8 +395,7 @@ done
   for core in ${built[@]+"${built[@]}"}; do
     runs=$out/$core-firmware.txt
     echo
-    echo "**${title[$core]}**; the whole image: $(text_bytes "$core" firmware) bytes; \`drive.cpp\` alone:" \
-      "$(text_bytes "$core" drive) bytes from a snapshot, $(text_bytes "$core" drive_make) with \`make\`"
+    echo "**${title[$core]}**"
     echo
     echo "| float, -O2 | code | guarded path | state | stack | deepest | instructions | at most |"
     echo "|---|---:|---:|---:|---:|---:|---:|---:|"
@@ -384,6 +405,15 @@ done
       echo "| ${shown[$observer]} | $code | $guarded | $(value "$runs" size "$observer" 3) |" \
         "$stack | $deepest | $(value "$runs" count "$observer" 3) | $(value "$runs" count "$observer" 4) |"
     done
+  done
+  echo
+  echo "**Images**, bytes of flash: all that runs here, and \`drive.cpp\` alone"
+  echo
+  echo "| | everything | drive, from a snapshot | drive, with make | make takes |"
+  echo "|---|---:|---:|---:|---:|"
+  for core in ${built[@]+"${built[@]}"}; do
+    snapshot=$(text_bytes "$core" drive) made=$(text_bytes "$core" drive_make)
+    echo "| ${title[$core]} | $(text_bytes "$core" firmware) | $snapshot | $made | $((made - snapshot)) |"
   done
   echo
   echo "**Controllers**, the whole step: law, limits and observer. Microseconds are the most instructions" \
@@ -472,16 +502,17 @@ done
 limit "AVR: cycles of eso_fixed" "$(value "$out/avr.txt" count eso_fixed 3)" 1100
 if grep -q '^done' "$out/avr.txt"; then pass; else fail "the C in integers differs on the AVR"; fi
 
-# Only a complete table goes into the page.
-if ((failed == 0)); then
-  awk -v table="$out/table.md" '
-    /^<!-- table/ { print; while ((getline line < table) > 0) print line; print ""; inside = 1 }
-    /^<!-- end of table/ { inside = 0 }
-    !inside' "$folder/README.md" >"$out/README.md"
-  if ! cmp -s "$out/README.md" "$folder/README.md"; then
-    cp "$out/README.md" "$folder/README.md"
-    echo "note: the table of examples/embedded/README.md has changed"
-  fi
+# The page says what this run measured.
+with_table "$folder/README.md" "$out/table.md" >"$out/README.md"
+if cmp -s "$out/README.md" "$folder/README.md"; then
+  pass
+elif [[ $write == yes ]] && ((${#built[@]} == ${#cores[@]})); then  # a complete table
+  cp "$out/README.md" "$folder/README.md"
+  echo "note: the tables of examples/embedded/README.md were written"
+  "$root/examples/common/check_readme.py" --pages --write "$root"/{,examples/*/}*.md || fail "see above"
+else
+  fail "the tables of examples/embedded/README.md are not those of this run; with --write they are:"
+  diff "$folder/README.md" "$out/README.md" | head -n 20 || true
 fi
 echo "all in $((SECONDS - started)) s"
 finish

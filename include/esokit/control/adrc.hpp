@@ -62,9 +62,7 @@ struct AdrcConfig {
 /// than the latency of the plant. So the law gets softer while it asks for more than u can give,
 /// and slowly recovers, see Softening. The analysis
 /// (`linear_controller`, `margins`) is of the law as designed, `softness()` 1; below, the loop is
-/// another one. With the option an update of LinearEso<3, float> takes 159 instructions on a
-/// Cortex-M4F, 339 while softened; without it 93, as before. PredictiveAdrc and MimoAdrc do not
-/// have it.
+/// another one. PredictiveAdrc and MimoAdrc do not have it.
 ///
 /// If the reference is not finite, u is kept (in the error-based form the measurement counts as
 /// missing). An applied u that is not finite is replaced by the last output. No call allocates,
