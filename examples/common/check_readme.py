@@ -49,8 +49,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 NUMBER = r"\d{1,3}(?:,\d{3})+(?![\d,])|\d+(?:\.\d+)?(?:e-?\d+)?"
-SIGNED = re.compile(rf"(?:(?<=^)-|(?<= )-)?(?:{NUMBER})")
-# One that a reader takes for a number: not the 4 of M4F or of float4, nor the 20 of C++20.
+# One that a reader takes for a number: not the 4 of M4F, nor the 20 of C++20.
+SIGNED = re.compile(rf"(?:(?<=^)-|(?<= )-)?(?<![\w.+#])(?:{NUMBER})")
 STANDING = re.compile(rf"(?<![\w.+#])(?:{NUMBER})(?![\w]|\.\d)")
 WORDS = {word: n for n, word in enumerate(
     "zero one two three four five six seven eight nine ten eleven twelve".split())}
@@ -358,6 +358,7 @@ def self_test():
     expect("a piece that stands twice", "is 0.4, is 0.4", f"is 0.4 <!--= {b} -->", 3, "stands 2 times")
     expect("a changed page", "It is 0.099.", f"It is 0.097 <!--= {a} -->", 2)
     expect("code, names and links", "`x = 5` M4F C++20 [a](b5.md)\n```\n7\n```\n1. first", "", 0)
+    expect("the 4 of M4F is a name", f"0.4 on an M4F <!--= {b} -->", None, 0)
     expect("a thousand", "1,000 runs", "", 1, "1,000 is not in")
     expect("lines of a file", f"{len(Path(__file__).read_text().splitlines())} <!--= lines "
            "examples/common/check_readme.py -->", None, 0)

@@ -18,6 +18,8 @@ from collections import namedtuple
 from pathlib import Path
 from urllib.parse import quote
 
+from check_readme import as_printed, replaced, sourced, value_of
+
 SUMMARY = ["case", "metric", "paper", "ours", "relative_error", "tolerance", "pass", "note"]
 CONTENTS = ["kind", "name", "text", "alt", "more", "figure"]
 MISSES = ("printed number missed", "the text does not describe what was simulated",
@@ -79,7 +81,7 @@ class Paper:
 
 
 def read_results(out):
-    """All papers in the order of their folders' names, then what is not a paper."""
+    """All that was run, a folder each."""
     folders = sorted(file.parent for file in out.rglob("summary.csv"))
     if not folders:
         raise ValueError(f"no summary.csv below {out}: run an example first")
@@ -91,10 +93,7 @@ def read_results(out):
                     if one.rows or any(item.kind != "remark" for item in one.items)]
         if examples:
             papers.append(Paper(folder.relative_to(out).as_posix(), examples))
-    # What a visitor comes for, then the other topics, then the papers.
-    first = ["from_log", "guards", "trades", "control_practice", "choosing"]
-    return sorted(papers, key=lambda one: (bool(one.link), first.index(one.folder)
-                                           if one.folder in first else len(first)))
+    return papers
 
 
 # ---- pieces of a page ----
@@ -320,56 +319,61 @@ def all_checks(example):
 
 # ---- pages ----
 
-def cover(out, paper):
-    """The paper's cover figure, whole."""
-    wanted = next((item.name for _, item in paper.items("cover")), None)
-    for one, item in paper.items("figure"):
-        if wanted in (None, item.name):
-            file = one.folder / (item.name + ".png")
-            width, height = png_size(out / file)
-            return (f'<svg role="img" aria-label="{esc(item.alt)}" viewBox="0 0 '
-                    f'{width} {height}"><image '
-                    f'href="{quote(file.as_posix())}" width="{width}" height="{height}"/></svg>\n')
-    return ""
+Card = namedtuple("Card", "section folder title question number")
 
 
-def playground(out):
-    """The first card: a page that computes, where it could be built."""
-    if not (out / "playground.html").exists():
-        return ""
-    # No figure of a run but the step response of two equal poles, of omega_c = 10 and 4 rad/s.
-    lines = "".join(
-        f'<path d="M{" ".join(f"{20 + 3.6 * i} {180 - 130 * (1 - (1 + w * i / 80) * math.exp(-w * i / 80)):.1f}" for i in range(101))}" '
-        f'fill="none" stroke="{colour}" stroke-width="4"/>' for w, colour in ((4, "#c2500a"), (10, "#0067a5")))
-    return ('<li><a href="playground.html"><svg role="img" aria-label="Two step responses" '
-            f'viewBox="0 0 400 220"><path d="M20 50H380M20 180H380" stroke="#d8dce3"/>{lines}</svg>'
-            "<b>Playground: a machine and a controller in this browser</b></a>\n"
-            '<p class="quiet">Move a slider: responses, disturbance, margins. Or drop a log: a model, a controller, C++ to take home.</p></li>\n')
+def cards(out, page):
+    """The rows of examples/README.md, which say what the pages answer; its numbers as they were run."""
+    changes = []
+    text = page.read_text(encoding="utf-8")
+    for one in sourced(page)[0]:
+        try:
+            value, most = value_of(one.source, out)
+        except ValueError:
+            continue  # was not run: as it is printed
+        if one.printed and not most:
+            changes.append((one.start, one.end, as_printed(value, one.printed)))
+    section, found = "", []
+    for line in replaced(text, changes).split("\n"):
+        if line.startswith("## "):
+            section = line[3:]
+        row = re.match(r"\| \[(.*)\]\(([\w/]+)/README\.md\) \|(.*)", line)
+        if row:
+            question, number = (row[3].split("|") + [""])[:2]
+            found.append(Card(section, row[2], row[1], question.strip(), number.strip()))
+    return found
 
 
 def overview(out, papers):
+    """Cards that lead to what is here, in the order of examples/README.md."""
     header = """<h1>esokit: what it does, and how well</h1>
 <p>Each card leads to a page with figures, tables and all numbers, made by the programs in \
 examples/.</p>
 """
-    judging = """<p>The programs reproduce five papers from their equations. Two kinds of \
-comparison are counted separately. A <b>printed number</b> is a number in a paper: it is met, \
-missed, or not judged (if no tolerance can be given, or if noise is too large for a verdict). \
-Numbers of single noisy runs are judged together, too, a column at a time: it is reproduced, \
-doubtful or not reproduced. An <b>own check</b> compares one of our \
-numbers with a formula, with an independent program, or with a limit that it has to keep: it \
-passes or fails.</p>
-"""
-    def cards(chosen, first=""):
-        return '<ul class="cards">\n' + first + "".join(
-            f'<li><a href="{paper.page}">{cover(out, paper)}<b>{esc(paper.title)}</b></a>\n'
-            f"{counts(paper)}</li>\n" for paper in chosen) + "</ul>\n"
+    here = {paper.folder: paper.page for paper in papers}
+    if (out / "playground.html").exists():
+        here["playground"] = "playground.html"
+    told = cards(out, Path(__file__).resolve().parents[1] / "README.md")
+    told += [Card("More", paper.folder, paper.title, "", "") for paper in papers
+             if paper.folder not in [card.folder for card in told]]
+    main = "".join(failures(paper, paper.page) for paper in papers)
+    for section, group in itertools.groupby((card for card in told if card.folder in here),
+                                            lambda card: card.section):
+        main += f'<h2>{esc(section)}</h2>\n<ul class="cards">\n' + "".join(
+            f'<li><a href="{here[card.folder]}"><b>{esc(card.title)}</b></a>\n'
+            f"<p>{esc(card.question)}</p>\n" +
+            (f'<p class="number">{esc(card.number)}</p>\n' if card.number else "") + "</li>\n"
+            for card in group) + "</ul>\n"
+    return header, main
 
-    topics = [paper for paper in papers if not paper.link]
-    printed = [paper for paper in papers if paper.link]
-    return header, ("".join(failures(paper, paper.page) for paper in papers) +
-                    (cards(topics, playground(out)) if topics else "") +
-                    (f'<h2 id="papers">Papers</h2>\n{judging}{cards(printed)}' if printed else ""))
+
+JUDGING = """<p class="quiet">Two kinds of comparison are counted separately. A <b>printed number</b> \
+is a number in the paper: it is met, missed, or not judged (if no tolerance can be given, or if noise \
+is too large for a verdict). Numbers of single noisy runs are judged together, too, a column at a \
+time: it is reproduced, doubtful or not reproduced. An <b>own check</b> compares one of our numbers \
+with a formula, with an independent program, or with a limit that it has to keep: it passes or \
+fails.</p>
+"""
 
 
 def one_paper(out, paper):
@@ -383,6 +387,7 @@ def one_paper(out, paper):
     header += ('</p>\n<p class="quiet">What this is, when it helps and how to use it: '
                f"{readme}. A tap on a figure enlarges it.</p>\n{counts(paper)}")
     if paper.link:
+        header += JUDGING
         header += ('<p class="quiet">A <b>continuous simulation</b>, as in the papers, integrates '
                    "plant and observer as one differential equation. A <b>sampled observer</b> is "
                    "updated once per sample, as in a controller.</p>\n")

@@ -416,8 +416,6 @@ void Report::correction(const Correction& correction) {
 
 void Report::additions(bool on) { contents_.push_back({"additions", "", on ? "on" : "off"}); }
 
-void Report::cover(const std::string& figure) { contents_.push_back({"cover", figure}); }
-
 // ---- begin and end ----
 
 std::string take_option(int& argc, char** argv, std::string_view name, std::string otherwise) {

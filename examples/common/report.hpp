@@ -237,8 +237,6 @@ class Report {
   /// All figures, tables and remarks from here on are additions of ours (or, with false, the
   /// paper's again): they come after the paper's own, at the end of its page.
   void additions(bool on = true);
-  /// The figure that stands for the paper on the front page; without it the first one.
-  void cover(const std::string& figure);
 
   /// Prints the checks, writes summary.csv and contents.csv. The exit code of the program: non-zero
   /// if a number that must reproduce was missed, or a figure or file could not be written.

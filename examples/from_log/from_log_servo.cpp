@@ -277,7 +277,6 @@ int main(int argc, char** argv) {
       .line(after.t, after.u, {.color = Color::blue, .width = 1.0, .column = "from the log"})
       .line(before.t, before.u, {.color = Color::grey, .width = 1.2, .column = "bad PID"});
   report.add(figure);
-  report.cover("servo");
 
   // For the README: the same machine before and after.
   Figure result("before_and_after", {.rows = 1, .columns = 2, .panel_height = 190});

@@ -143,7 +143,6 @@ int main(int argc, char** argv) {
                 {.color = Color::black, .marker = Marker::cross, .size = 2});
   }
   report.add(figure);
-  report.cover("drives");
 
   // For the README: the first few, in one panel.
   Figure which("which", {.rows = 1, .columns = 1, .panel_height = 240});
