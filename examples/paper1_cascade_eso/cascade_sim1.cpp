@@ -66,7 +66,6 @@ int main(int argc, char** argv) {
                       "A second-order plant under a sine disturbance, without (A) and with (B) "
                       "measurement noise. Continuous simulation, RK4 at 1 ms.",
                       1));
-  report.cover("fig4");
 
   // Sim1A, Sim1B's first seed for the figure, and all seeds for the table.
   const auto quiet = paper_runs(0.0);

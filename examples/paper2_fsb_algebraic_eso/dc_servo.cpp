@@ -203,7 +203,6 @@ int main(int argc, char** argv) {
             "Tracking of sin t from five initial states with a linear and with the algebraic "
             "observer. Continuous simulation: plant, observer and law as one ODE, RK4 at 1 ms.",
             1));
-  report.cover("fig3");
   for (const auto& [where, printed, correct] :
        {std::array{"(11)", "the second term (misprint)", "-3 (s + 2q) u(s + 2q)"},
         std::array{"(28)", "w3~ (misprint)", "w3~ = G w1bar + G^2 w2bar + G^3 w3bar"},

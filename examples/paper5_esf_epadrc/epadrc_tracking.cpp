@@ -177,7 +177,6 @@ int main(int argc, char** argv) {
                       "An unstable second-order plant under ADRC, PADRC and EPADRC at three noise "
                       "levels. Sampled controllers at 1 ms.",
                       1));
-  report.cover("fig4");
 
   struct Case {
     Reference reference;
