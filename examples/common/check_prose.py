@@ -1,13 +1,15 @@
 #!/usr/bin/env python3
-"""Whether a page reads well enough to be read once: check_prose.py PAGE[=WORDS]...
+"""Whether a page can be read once: check_prose.py PAGE[=WORDS]... [--links PAGE...]
 
 No sentence of its text has more than 35 words; with =WORDS the whole page has at most so many, as
 `wc -w` counts. Code, links and comments are no text; a cell of a table and an item of a list end a
-sentence. `--self-test` instead sees both refused. The last line is "N passed, N failed".
+sentence. Of the pages behind --links only the links are looked at: files and headings exist.
+`--self-test` instead sees each refused. The last line is "N passed, N failed".
 """
 
 import re
 import sys
+import tempfile
 from pathlib import Path
 
 MOST = 35
@@ -28,6 +30,28 @@ def problems(page, most_words=None):
     return found
 
 
+def anchors(text):
+    """What a #link may name: the headings as GitHub writes them."""
+    heads = re.findall(r"^#+ (.*)$", re.sub(r"^```.*?^```", "", text, flags=re.DOTALL | re.MULTILINE), re.MULTILINE)
+    heads = [re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", head).strip().lower() for head in heads]
+    return {re.sub(r"[^\w\- ]", "", head).replace(" ", "-") for head in heads}
+
+
+def broken_links(file):
+    text = re.sub(r"^```.*?^```|`[^`\n]*`", "", file.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+    found = []
+    for link in re.findall(r"\]\(([^)\s]+)\)", text):
+        name, _, anchor = link.partition("#")
+        to = file.parent / name if name else file
+        if re.match(r"https?:|mailto:", link):
+            continue
+        if not to.exists():
+            found.append(f"leads nowhere: {link}")
+        elif anchor and to.suffix == ".md" and anchor not in anchors(to.read_text(encoding="utf-8")):
+            found.append(f"leads to no heading: {link}")
+    return found
+
+
 def self_test():
     long = "word " * 35
     cases = [(f"{long}end.", None, 1), (f"{long}.", None, 0), (f"{long}\n- {long}\n", None, 0),
@@ -37,6 +61,15 @@ def self_test():
     wrong = [case for case in cases if len(problems(case[0], case[1])) != case[2]]
     for case in wrong:
         print(f"self-test: {case}: {problems(case[0], case[1])}")
+    with tempfile.TemporaryDirectory() as folder:
+        page = Path(folder) / "page.md"
+        for link, broken in (("page.md", 0), ("#a-head-of-it", 0), ("page.md#a-head-of-it", 0), ("#none", 1),
+                             ("none.md", 1), ("page.md#none", 1), ("https://example.org/none", 0)):
+            page.write_text(f"# A `head`, of it\n[x]({link})\n", encoding="utf-8")
+            cases.append(link)
+            if len(broken_links(page)) != broken:
+                wrong.append(link)
+                print(f"self-test: {link}: {broken_links(page)}")
     print(f"{len(cases) - len(wrong)} passed, {len(wrong)} failed")
     return not wrong
 
@@ -46,14 +79,21 @@ def main():
         sys.exit(0 if self_test() else 1)
     if len(sys.argv) < 2:
         sys.exit(__doc__.splitlines()[0])
-    failed = 0
+    failed = looked = 0
+    links_alone = False
     for argument in sys.argv[1:]:
+        if argument == "--links":
+            links_alone = True
+            continue
         name, _, words = argument.partition("=")
-        found = problems(Path(name).read_text(encoding="utf-8"), int(words) if words else None)
+        found = broken_links(Path(name))
+        if not links_alone:
+            found += problems(Path(name).read_text(encoding="utf-8"), int(words) if words else None)
+        looked += 1
         for problem in found:
             print(f"{name}: {problem}")
         failed += bool(found)
-    print(f"{len(sys.argv) - 1 - failed} passed, {failed} failed")
+    print(f"{looked - failed} passed, {failed} failed")
     sys.exit(0 if not failed else 1)
 
 

@@ -18,6 +18,7 @@ from collections import namedtuple
 from pathlib import Path
 from urllib.parse import quote
 
+sys.dont_write_bytecode = True  # nothing is left beside the sources
 from check_readme import as_printed, replaced, sourced, value_of
 
 SUMMARY = ["case", "metric", "paper", "ours", "relative_error", "tolerance", "pass", "note"]

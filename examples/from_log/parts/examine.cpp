@@ -272,10 +272,10 @@ void say_residual(const compiled::Residual& residual, Findings& all) {
   }
   if (rows < 600) {
     const auto averaged = static_cast<std::size_t>(all.found.averaged);
-    all.shown.push_back("The log is short: " + std::to_string(e.size() * averaged) +
-                        (averaged > 1 ? " rows, averaged to " + std::to_string(e.size()) + ", "
-                                      : " rows, ") +
-                        duration_text(rows * T) + ".");
+    all.shown.push_back(
+        "The log is short: " + std::to_string(e.size() * averaged) +
+        (averaged > 1 ? " rows, averaged to " + std::to_string(e.size()) + ", " : " rows, ") +
+        duration_text(rows * T) + ".");
   }
 }
 
