@@ -66,6 +66,10 @@ declare -A shown=([LinearEso]="LinearEso<2>" [CascadeEso]="CascadeEso<2, 3>"
 controllers=(Adrc AdrcLimited MimoAdrc)
 shown+=([Adrc]="Adrc<LinearEso<2>>" [AdrcLimited]="the same, u limited in its rate, too"
   [MimoAdrc]="MimoAdrc of two LinearEso<2>")
+models=(MotorLag1 MotorLag2 SensorLag1 SensorLag2 Resonator)
+shown+=([MotorLag1]="a motor lag, order 1" [MotorLag2]="a motor lag, order 2"
+  [SensorLag1]="a sensor lag, order 1" [SensorLag2]="a sensor lag, order 2"
+  [Resonator]="a resonator, order 2")
 clocks=(48 72 168)  # MHz
 
 out=$root/build/firmware
@@ -431,6 +435,15 @@ done
         "$stack | $deepest | $(value "$runs" count "$controller" 3) | $most |$(for clock in "${clocks[@]}"; do
           awk -v n="$most" -v f="$clock" 'BEGIN { printf " %.3g us |", n / f }'; done)"
     done
+  done
+  echo
+  echo "**Observers with a model** (\`ModelEso\`), instructions of \`update\`"
+  echo
+  echo "| in the model |$(for core in ${built[@]+"${built[@]}"}; do printf ' %s |' "${title[$core]}"; done)"
+  echo "|---|$(for core in ${built[@]+"${built[@]}"}; do printf -- '---:|'; done)"
+  for model in "${models[@]}"; do
+    echo "| ${shown[$model]} |$(for core in ${built[@]+"${built[@]}"}; do
+      printf ' %s |' "$(value "$out/$core-controllers.txt" count "$model" 3)"; done)"
   done
   echo
   echo "**The C of \`to_c\`**, -Os, \`max_gap\` 10: bytes of flash with all its functions, bytes of state, and" \

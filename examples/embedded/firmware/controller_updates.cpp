@@ -15,6 +15,11 @@ template <class Design>
       std::bit_cast<std::uint32_t>(static_cast<Design::Controller*>(controller)->update(y, r)));
 }
 
+template <class Design>
+[[gnu::always_inline]] inline unsigned observed(void* observer, float y, float u_applied) {
+  return static_cast<unsigned>(static_cast<Design::Observer*>(observer)->update(y, u_applied));
+}
+
 }  // namespace
 
 extern "C" {
@@ -30,6 +35,22 @@ unsigned update_MimoAdrc(void* controller, float y, float r) {
   using Output = Double::Controller::Output;
   const auto u = static_cast<Double::Controller*>(controller)->update(Output{y, y}, Output{r, r});
   return static_cast<unsigned>(std::bit_cast<std::uint32_t>(u(0)));
+}
+
+unsigned update_MotorLag1(void* observer, float y, float u) {
+  return observed<MotorLag1>(observer, y, u);
+}
+unsigned update_MotorLag2(void* observer, float y, float u) {
+  return observed<MotorLag2>(observer, y, u);
+}
+unsigned update_SensorLag1(void* observer, float y, float u) {
+  return observed<SensorLag1>(observer, y, u);
+}
+unsigned update_SensorLag2(void* observer, float y, float u) {
+  return observed<SensorLag2>(observer, y, u);
+}
+unsigned update_Resonator(void* observer, float y, float u) {
+  return observed<Resonator>(observer, y, u);
 }
 
 }  // extern "C"

@@ -1,4 +1,5 @@
-// What a whole step of a controller costs, in a loop that has to come to its reference.
+// What a whole step of a controller costs, in a loop that has to come to its reference; and an
+// update of observers with a model.
 //
 //   size NAME bytes
 //   count NAME last most      instructions of update: of the last sample, of any
@@ -56,6 +57,37 @@ bool count(const InstructionCounter* counter) {
   return there;
 }
 
+template <class Design>
+constinit std::optional<typename Design::Observer> observer;
+
+/// An observer beside a servo that u = 0.1 V drives.
+template <class Design>
+bool count_alone(const InstructionCounter* counter) {
+  const auto made = Design::make();
+  if (!made) {
+    Line("refused").word(Design::name).word(made.error().field).word(made.error().rule);
+    return false;
+  }
+  auto& running = observer<Design>;
+  running.emplace(*made);
+  Line("size").word(Design::name).number(sizeof(*running));
+  Servo servo;
+  std::uint32_t last = 0;
+  std::uint32_t most = 0;
+  for (int k = 0; k < 400; ++k) {
+    servo.step(0.1f, 0.0f);
+    const float y = servo.measure();
+    if (counter != nullptr) {
+      last = counter->count(Design::update, &*running, y, 0.1f);
+      most = most < last ? last : most;
+    } else {
+      (void)Design::update(&*running, y, 0.1f);
+    }
+  }
+  if (counter != nullptr) Line("count").word(Design::name).number(last).number(most);
+  return true;
+}
+
 }  // namespace
 
 }  // namespace firmware
@@ -65,7 +97,10 @@ int run_firmware() {
   std::optional<InstructionCounter> counter;
   if (board::counts()) counter.emplace();
   const InstructionCounter* counts = counter ? &*counter : nullptr;
-  const bool fine = count<Single>(counts) && count<Limited>(counts) && count<Double>(counts);
+  const bool fine = count<Single>(counts) && count<Limited>(counts) && count<Double>(counts) &&
+                    count_alone<MotorLag1>(counts) && count_alone<MotorLag2>(counts) &&
+                    count_alone<SensorLag1>(counts) && count_alone<SensorLag2>(counts) &&
+                    count_alone<Resonator>(counts);
   if (fine) Line("done");
   return fine ? 0 : 1;
 }
