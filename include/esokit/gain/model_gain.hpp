@@ -124,10 +124,10 @@ struct PartDesign {
     // to the sum of which P consists; that lets V fall there, and rise elsewhere. What the gain
     // does not move, as a lag that is only computed, has an error all the same.
     constexpr int rounds = 8;
-    for (const double share : {1.0, 0.2}) {
+    for (const S share : {S(1), S(0.2)}) {
       Square spread = column(gain) * column(gain).transpose() + Square::Identity() * least;
       for (int round = 0; round < rounds && longest_step < Longest; ++round) {
-        const S rate = S(share) * decay;
+        const S rate = share * decay;
         const auto square = FallingSquare<Size, S>::make(sample, spread, rate);
         if (!square) break;
         const Square rising = find_gap_gains(*square, step, output, units);
