@@ -24,7 +24,7 @@ from check_readme import as_printed, replaced, sourced, value_of
 SUMMARY = ["case", "metric", "paper", "ours", "relative_error", "tolerance", "pass", "note"]
 CONTENTS = ["kind", "name", "text", "alt", "more", "figure"]
 MISSES = ("printed number missed", "the text does not describe what was simulated",
-          "a claim does not hold", "settings or data not published",  # miss_texts in report.cpp
+          "settings or data not published",  # miss_texts in report.cpp
           "doubtful", "does not reproduce")  # column_texts there
 COLUMN = "chi-square of the column"  # column_metric there
 WIDEST = 10  # columns of a table, then it is split
@@ -217,14 +217,21 @@ def misses(paper):
 
 
 def claims(paper):
-    kinds = {"holds": "pass", "not tested": "reported"}
-    return table("What the paper claims, and whether it holds here",
+    kinds = {"holds": ("pass", "hold"), "holds in part": ("known_miss", "hold in part"),
+             "does not hold": ("known_miss", "do not hold"), "not tested": ("reported", "not tested")}
+    found = paper.items("claim")
+    if len({(item.text, item.name) for _, item in found if item.name}) < len(found):
+        raise ValueError(f"{paper.folder}: a claim without its place, or judged twice")
+    verdicts = [item.alt for _, item in found]
+    how_many = ", ".join(f"{verdicts.count(one)} {one if verdicts.count(one) == 1 else many}"
+                         for one, (_, many) in kinds.items() if one in verdicts)
+    return table(f"What the paper claims, and whether it holds here: {how_many}",
                  ["claim", "in the paper", "here", "shown in"], [
         (cell(item.text, "text"), cell(item.name, "text narrow"),
-         f'<td class="text"><b class="{kinds.get(item.alt, "known_miss")}">{esc(item.alt)}.</b> '
+         f'<td class="text"><b class="{kinds[item.alt][0]}">{esc(item.alt)}.</b> '
          f"{esc(item.more)}</td>",
          f'<td class="text narrow"><a href="#{one.anchor}">{esc(item.figure or one.name)}</a></td>')
-        for one, item in paper.items("claim")], [True] * 4)
+        for one, item in found], [True] * 4)
 
 
 def corrections(paper):

@@ -19,7 +19,7 @@ namespace {
 // tell it from a failure: both have pass = no.
 constexpr std::array miss_texts = {"printed number missed",
                                    "the text does not describe what was simulated",
-                                   "a claim does not hold", "settings or data not published"};
+                                   "settings or data not published"};
 
 // They begin the note of a column's row in the same way.
 constexpr std::array column_texts = {"reproduces", "doubtful", "does not reproduce", "not judged"};
@@ -93,13 +93,16 @@ std::string shown_text(double value, std::optional<double> like) {
 std::string mean_text(const Statistics& seeds) {
   const double deviation = seeds.standard_deviation;
   if (!std::isfinite(deviation) || deviation <= 0.0) return shown_text(seeds.mean);
-  // The deviation with two digits, and as many decimals for both.
-  // Where it is nothing beside the mean, it says only that.
-  if (deviation < 1e-6 * std::abs(seeds.mean)) {
-    return shown_text(seeds.mean) + " (nearly 0)";
-  }
-  const int decimals = std::clamp(1 - static_cast<int>(std::floor(std::log10(deviation))), 0, 17);
-  return fixed(seeds.mean, decimals) + " (" + fixed(deviation, decimals) + ")";
+  const auto decimals_for = [](int digits, double number) {
+    return std::clamp(digits - 1 - static_cast<int>(std::floor(std::log10(number))), 0, 17);
+  };
+  // The deviation with two digits, and as many decimals for both; but the mean with four digits at
+  // most. Where the deviation is nothing beside that, it says only this.
+  const double size = std::max(std::abs(seeds.mean), deviation);
+  const int decimals = std::min(decimals_for(2, deviation), decimals_for(4, size));
+  const std::string spread = fixed(deviation, decimals);
+  const bool seen = spread.find_first_of("123456789") != std::string::npos;
+  return fixed(seeds.mean, decimals) + " (" + (seen ? spread : "nearly 0") + ")";
 }
 
 double chi_square_tail(double chi_square, int degrees_of_freedom) {

@@ -39,7 +39,8 @@ struct About {
   bool addition = false;         ///< nothing of it is in the paper
 };
 
-/// What the paper says, and whether it holds here. `holds` is computed by the program.
+/// What the paper says, and whether it holds here: once for each claim, its only verdict. `holds`
+/// is computed by the program.
 struct Claim {
   enum class Holds { yes, partly, no, not_tested };
 
@@ -62,7 +63,6 @@ struct Correction {
 enum class Miss {
   printed_number,  ///< a printed number is missed, and we do not know why
   other_reading,   ///< the text does not describe what was simulated; another reading works
-  claim,           ///< a claim does not hold
   not_published    ///< settings or data that are needed are not published
 };
 
