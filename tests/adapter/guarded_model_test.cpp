@@ -635,7 +635,7 @@ TEST(GuardedModel, LeakLeadsWhereTheDesignSays) {
   EXPECT_NEAR(y - z(0), load * error(0), 1e-9);
   EXPECT_NEAR(-z(1), load * error(1), 1e-8);  // y' is 0
   EXPECT_NEAR(shown - z(3), load * error(3), 1e-9);
-  EXPECT_EQ(Guarded<ModelEso<lag>>::make({lagging()}).value().leak_error(),
+  EXPECT_EQ(Guarded<ModelEso<lag>>::make({.observer = lagging()}).value().leak_error(),
             (ModelEso<lag>::Estimate::Zero()));
 }
 
@@ -658,7 +658,7 @@ TEST(GuardedModel, RetunedTakesTheNewModel) {
 }
 
 TEST(GuardedModel, RefusesAnInputGainThatIsNone) {
-  auto guarded = Guarded<ModelEso<lag>>::make({lagging()}).value();
+  auto guarded = Guarded<ModelEso<lag>>::make({.observer = lagging()}).value();
   for (int k = 0; k < 50; ++k) (void)guarded.update(0.1 * k, 1);
   for (const double bad : {0.0, -2.0, hidden_nan<double>(), hidden_infinity<double>()}) {
     EXPECT_EQ(refusal(guarded.set_input_gain(bad)),

@@ -184,10 +184,13 @@ TEST(Gating, EqualPolesPass) {
     const double least = least_real_part(law);
     EXPECT_LT(least, -1.0 / 3 + 1e-3);
     EXPECT_GT(least, -0.5);
-    EXPECT_TRUE(Guarded<LinearEso<1>>::make({settings<LinearEso<1>>(omega_T)}).has_value());
-    EXPECT_TRUE((Guarded<LinearEso<5>>::make({settings<LinearEso<5>>(omega_T)}).has_value()));
     EXPECT_TRUE(
-        (Guarded<LinearEso<2, float>>::make({settings<LinearEso<2, float>>(omega_T)}).has_value()));
+        Guarded<LinearEso<1>>::make({.observer = settings<LinearEso<1>>(omega_T)}).has_value());
+    EXPECT_TRUE(
+        (Guarded<LinearEso<5>>::make({.observer = settings<LinearEso<5>>(omega_T)}).has_value()));
+    EXPECT_TRUE(
+        (Guarded<LinearEso<2, float>>::make({.observer = settings<LinearEso<2, float>>(omega_T)})
+             .has_value()));
   }
   EXPECT_NEAR(
       least_real_part(LinearEso<2>::make(settings<LinearEso<2>>(1e-3)).value().level_gain(0)),
@@ -222,7 +225,7 @@ TEST(Gating, RefusesAGainThatIsNotProven) {
 }
 
 TEST(Gating, RefusesAnInputGainThatIsNone) {
-  auto guarded = Guarded<LinearEso<2>>::make({settings<LinearEso<2>>()}).value();
+  auto guarded = Guarded<LinearEso<2>>::make({.observer = settings<LinearEso<2>>()}).value();
   for (const double bad : {0.0, -2.0, hidden_nan<double>(), hidden_infinity<double>(), 1e-310}) {
     const auto refused = guarded.set_input_gain(bad);
     EXPECT_EQ(refusal(refused),
@@ -263,7 +266,7 @@ TEST(Gating, AnyPatternIsStable) {
 TEST(Gating, TrustScalesTheCorrectionOfDhatAlone) {
   const auto config = settings<CascadeEso<2, 2>>();
   auto plain = CascadeEso<2, 2>::make(config).value();
-  auto guarded = Guarded<CascadeEso<2, 2>>::make({config}).value();
+  auto guarded = Guarded<CascadeEso<2, 2>>::make({.observer = config}).value();
   guarded.set_trust(0.25);
   EXPECT_TRUE(guarded.gated());
   (void)plain.update(1, 0.5);
@@ -450,7 +453,7 @@ TEST(Leak, LeadsWhereTheDesignSays) {
 }
 
 TEST(Leak, NoneIsNoError) {
-  const auto guarded = Guarded<LinearEso<2>>::make({settings<LinearEso<2>>()}).value();
+  const auto guarded = Guarded<LinearEso<2>>::make({.observer = settings<LinearEso<2>>()}).value();
   EXPECT_EQ(guarded.leak_error(), (LinearEso<2>::Estimate::Zero()));
 }
 
@@ -499,7 +502,7 @@ TEST(Leak, RefusesWhatIsNoTime) {
   using Varying = VariableTime<Plain>;
   EXPECT_EQ(refused(Sloped::make(settings<Sloped>()).value(), 1), gated);
   EXPECT_EQ(refused(Varying::make(settings<Varying>()).value(), 1), gated);
-  EXPECT_TRUE(Guarded<Sloped>::make({settings<Sloped>()}).has_value());
+  EXPECT_TRUE(Guarded<Sloped>::make({.observer = settings<Sloped>()}).has_value());
 }
 
 // ---- held

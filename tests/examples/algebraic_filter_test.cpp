@@ -414,8 +414,10 @@ TEST(AlgebraicFilter, RefusesBadConfigByName) {
   for (const auto& [config, expected] : bad) {
     const auto filter = AlgebraicFilter<2>::make(config);
     EXPECT_EQ(refusal(filter), expected);
-    const auto chain = esokit::ContinuousAlgebraicEso<2>::make(
-        {config.observer_bandwidth, config.frequency_shift, config.input_gain});
+    const auto chain =
+        esokit::ContinuousAlgebraicEso<2>::make({.observer_bandwidth = config.observer_bandwidth,
+                                                 .frequency_shift = config.frequency_shift,
+                                                 .input_gain = config.input_gain});
     EXPECT_EQ(refusal(chain), expected);
   }
 }

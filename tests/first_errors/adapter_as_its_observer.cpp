@@ -1,4 +1,4 @@
-// expect: (cannot bind|invalid initiali[sz]ation|non-const lvalue reference).*LinearEso
+// expect: (conversion|invalid initiali[sz]ation|non-const lvalue reference).*LinearEso
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/observer/linear_eso.hpp>
 

@@ -1,4 +1,5 @@
-// expect: call applied\(u\) before update
+// expect: deleted .*function
+// also: call applied\(u\) before update
 #include <esokit/control/adrc.hpp>
 #include <esokit/observer/linear_eso.hpp>
 

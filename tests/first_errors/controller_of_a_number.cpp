@@ -1,4 +1,4 @@
-// expect: LoopObserver|constraints not satisfied for class template 'Adrc'
+// expect: esokit: controllers and adapters take the type of an observer
 #include <esokit/control/adrc.hpp>
 
 auto controller = esokit::Adrc<double>::make({});

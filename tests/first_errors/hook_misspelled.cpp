@@ -1,4 +1,5 @@
-// expect: HasNoMisspelledHook
+// expect: esokit: a gain law has .gain\(e\) const noexcept.
+// also: HasNoMisspelledHook
 #include <esokit/observer/predictor_corrector.hpp>
 
 struct Schedule {

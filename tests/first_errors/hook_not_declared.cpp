@@ -1,4 +1,5 @@
-// expect: AdvancesAsDeclared
+// expect: esokit: a gain law has .* is declared in its .traits.
+// also: AdvancesAsDeclared
 #include <esokit/observer/predictor_corrector.hpp>
 
 struct Schedule {

@@ -1,4 +1,5 @@
-// expect: BridgesGapsAsDeclared
+// expect: esokit: a gain law has .* with the right signature
+// also: BridgesGapsAsDeclared
 #include <esokit/observer/predictor_corrector.hpp>
 
 struct Bridging {

@@ -1,4 +1,4 @@
-// expect: LinearEso(<2>|Config)
+// expect: cannot convert .*LinearEso<2>::Config|designator 'bandwidth' does not refer to any field
 #include <esokit/observer/linear_eso.hpp>
 
 auto observer =

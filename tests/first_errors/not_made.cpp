@@ -1,4 +1,4 @@
-// expect: no matching (function|constructor).*LinearEso|deleted default constructor of .*LinearEso
+// expect: (deleted function|deleted default constructor).*LinearEso
 #include <esokit/observer/linear_eso.hpp>
 
 void run() {

@@ -1,4 +1,5 @@
-// expect: its name is applied\(u\)
+// expect: deleted function
+// also: its name is applied\(u\)
 #include <esokit/control/predictive_adrc.hpp>
 #include <esokit/observer/linear_eso.hpp>
 

@@ -1,4 +1,4 @@
-// expect: ControllerOf|Controller<|Commands
+// expect: esokit: a controller for this plant has u = update\(y, r\)
 #include <esokit/sim/run.hpp>
 
 const auto plant = esokit::LinearPlant<1>::chain({}).value();

@@ -1,4 +1,5 @@
-// expect: PublishesChainAsDeclared
+// expect: esokit: controllers and adapters take .* declared in its traits
+// also: PublishesChainAsDeclared
 #include <esokit/control/adrc.hpp>
 #include <esokit/observer/linear_eso.hpp>
 

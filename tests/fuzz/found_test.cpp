@@ -261,7 +261,8 @@ TEST(Found, MarginsOfAPlantWithNextToNoGainAreNumbers) {
 }
 
 TEST(Found, ErrorBoundsAreNumbers) {
-  const auto bound = esokit::linear_error_bound<3>({2, 1}, {5, 1e-3}).value();
+  const auto bound =
+      esokit::linear_error_bound<3>({.observer_bandwidth = 2, .input_gain = 1}, {5, 1e-3}).value();
   EXPECT_TRUE(bound.convergence_time({1, 2, 3}));
   EXPECT_EQ(refusal(bound.convergence_time({1, 2, HUGE_VAL})), "initial[2]: must be finite");
   EXPECT_EQ(refusal(bound.convergence_time({1, largest<double>, 3})),
@@ -269,7 +270,9 @@ TEST(Found, ErrorBoundsAreNumbers) {
   const std::string rule =
       "observer_bandwidth: gives with these sources a bound that the scalar cannot hold";
   EXPECT_EQ(refusal(esokit::linear_error_bound<3>({2e-209, 1}, {0, 1e-3})), rule);
-  EXPECT_EQ(refusal(esokit::linear_error_bound<3>({2, 1}, {5, largest<double>})), rule);
+  EXPECT_EQ(refusal(esokit::linear_error_bound<3>({.observer_bandwidth = 2, .input_gain = 1},
+                                                  {5, largest<double>})),
+            rule);
   EXPECT_EQ(refusal(esokit::switched_error_bound<3>({1e306, 0.7, 1}, {5, 1e-3})), rule);
   EXPECT_EQ(refusal(esokit::cascade_error_bounds<2, 3, 2>(
                 {.observer_bandwidth = 1e120, .bandwidth_factor = 2, .input_gain = 1}, {5, 1e-3})),

@@ -265,7 +265,8 @@ Failure bound_study(Episode& episode) {
   const double factor = study.number<double>("factor", {1.2, 3});
   const double least = study.number<double>("least", {0.4, 1});
   const double greatest = study.number<double>("greatest", {1, 2});
-  if (const auto b = study.answer("linear", linear_error_bound<3>({w, 1.0}, sources))) {
+  if (const auto b = study.answer(
+          "linear", linear_error_bound<3>({.observer_bandwidth = w, .input_gain = 1.0}, sources))) {
     ask_bound(study, *b);
   }
   const ContinuousCascadeEsoConfig<3, 2, double, EqualPoles> cascade{
@@ -343,24 +344,30 @@ Failure signal_study(Episode& episode) {
   const double tau = study.number<double>("tau", {0.1, 2});
   const double w = study.number<double>("angular_frequency", rate);
   ask_signal(study, "Constant", sim::Constant<>::make({size}), t);
-  ask_signal(study, "Step", sim::Step<>::make({time, size}), t);
-  ask_signal(study, "Sine", sim::Sine<>::make({size, w, tau, time}), t);
-  ask_signal(study, "FilteredStep", sim::FilteredStep<5>::make({time, size, tau}), t);
+  ask_signal(study, "Step", sim::Step<>::make({.time = time, .size = size}), t);
+  ask_signal(
+      study, "Sine",
+      sim::Sine<>::make({.amplitude = size, .angular_frequency = w, .phase = tau, .offset = time}),
+      t);
+  ask_signal(study, "FilteredStep",
+             sim::FilteredStep<5>::make({.time = time, .size = size, .time_constant = tau}), t);
 
   const double power = study.number<double>("power", {1e-6, 1, true});
   const double hold = study.number<double>("hold", {0.1, 1});
   const int multiple = 1 + study.choice("multiple", 20);
-  if (const auto made = study.answer("noise", sim::WhiteNoise<>::make({power, 3}))) {
+  if (const auto made = study.answer(
+          "noise", sim::WhiteNoise<>::make({.standard_deviation = power, .seed = 3}))) {
     auto noise = *made;
     const double value = noise.next();
     if (study.plain()) study.finite("WhiteNoise", value);
   }
-  if (const auto made =
-          study.answer("noise", sim::BandLimitedWhiteNoise<>::make({power, hold, 3}))) {
+  if (const auto made = study.answer(
+          "noise", sim::BandLimitedWhiteNoise<>::make({.power = power, .hold = hold, .seed = 3}))) {
     study.finite("standard_deviation", made->standard_deviation());
   }
-  if (const auto made =
-          study.answer("noise", sim::HeldNoise<>::make({power, hold, hold / multiple, 3}))) {
+  if (const auto made = study.answer(
+          "noise", sim::HeldNoise<>::make(
+                       {.power = power, .hold = hold, .step = hold / multiple, .seed = 3}))) {
     auto noise = *made;
     for (const int k : {0, 3, 100, 7, -1}) {
       const double value = noise.at(k);
@@ -369,7 +376,8 @@ Failure signal_study(Episode& episode) {
   }
   if (const auto plant = study.answer("chain", LinearPlant<2>::chain({{size, tau}, w, 0.0}))) {
     ask_plant(study, *plant, tau);
-    if (const auto disturbed = study.answer("disturbed", sim::DisturbedPlant<2>::make({*plant}))) {
+    if (const auto disturbed =
+            study.answer("disturbed", sim::DisturbedPlant<2>::make({.plant = *plant}))) {
       const auto slope = disturbed->derivative(t, {time, size}, tau);
       if (study.plain()) study.finite("derivative", slope);
     }

@@ -36,8 +36,10 @@ struct ExtensionOf<Observer> {
 /// Base of the adapters: forwards the members of the observer whose result no adapter changes. An
 /// adapter adds make, retune, update, predict, correct and reset, redefines members whose result
 /// differs, and deletes those that it cannot offer.
-template <LoopObserver Observer>
-class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Observer> {
+template <class Observer>
+requires(detail::goes_into_a_loop<Observer>()) class Adapter
+    : public detail::LevelsOf<Observer>,
+      public detail::ExtensionOf<Observer> {
   friend struct detail::GuardAccess;
   friend struct detail::LaneAccess;
 
@@ -209,7 +211,7 @@ class NamedAdapter : public Adapter<Observer> {
   /// Checks the settings and does all the design work.
   /// @return the adapter, with its observer at rest at zero, or an error that names the field
   static Expected<Self, Error<scalar_type>> make(const Config& config) {
-    detail::refuse_packs<scalar_type>();
+    static_assert(detail::refuses_packs<scalar_type>());
     if (Check<scalar_type> ok = Self::validate(config); !ok) return ok.error();
     const auto observer = Observer::make(config.observer);
     if (!observer) return observer.error();

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <esokit/adapter/adapter.hpp>
+#include <esokit/core/check.hpp>
 #include <esokit/core/kernels.hpp>
 #include <esokit/core/lanes.hpp>
 #include <esokit/core/type_tag.hpp>
@@ -12,12 +13,13 @@
 namespace esokit {
 
 /// Config of DelayedInput.
-template <LoopObserver Observer>
-struct DelayedInputConfig {
+template <class Observer>
+requires(detail::goes_into_a_loop<Observer>()) struct DelayedInputConfig {
   using S = typename Observer::scalar_type;  ///< type of signals and settings
 
-  typename Observer::Config observer{};  ///< config of the observer
-  int delay = 0;                         ///< d, samples, 0 .. Capacity
+  [[no_unique_address]] ByName<DelayedInputConfig> by_name{};  ///< nothing to set, see ByName
+  typename Observer::Config observer{};                        ///< config of the observer
+  int delay = 0;                                               ///< d, samples, 0 .. Capacity
 };
 
 /// Passes u[k-d] instead of u[k] to the observer (for a delay of d sample times by bus, drive or
@@ -28,9 +30,10 @@ struct DelayedInputConfig {
 /// not predicted.
 /// Packs compute all lanes at once while these agree on d and the place in the delay line.
 /// @tparam Capacity largest d of a config; the memory is Capacity + 1 scalars
-template <LoopObserver Observer, int Capacity>
-class DelayedInput : public NamedAdapter<DelayedInput<Observer, Capacity>, Observer,
-                                         DelayedInputConfig<Observer>> {
+template <class Observer, int Capacity>
+requires(detail::goes_into_a_loop<Observer>()) class DelayedInput
+    : public NamedAdapter<DelayedInput<Observer, Capacity>, Observer,
+                          DelayedInputConfig<Observer>> {
   using Base = NamedAdapter<DelayedInput, Observer, DelayedInputConfig<Observer>>;
   friend Base;
   friend struct detail::LaneAccess;
@@ -190,7 +193,7 @@ class DelayedInput : public NamedAdapter<DelayedInput<Observer, Capacity>, Obser
 };
 
 /// Distinguishes the type in snapshots.
-template <LoopObserver Observer, int Capacity>
+template <class Observer, int Capacity>
 inline constexpr std::uint32_t type_tag<DelayedInput<Observer, Capacity>> =
     make_type_tag<Observer>("DelayedInput", Capacity);
 

@@ -7,17 +7,19 @@
 #include <esokit/adapter/adapter.hpp>
 #include <esokit/adapter/correction_weights.hpp>
 #include <esokit/adapter/guarded_states.hpp>
+#include <esokit/core/check.hpp>
 #include <esokit/core/type_tag.hpp>
 #include <limits>
 
 namespace esokit {
 
 /// Config of Guarded.
-template <LoopObserver Observer>
-struct GuardedConfig {
+template <class Observer>
+requires(detail::goes_into_a_loop<Observer>()) struct GuardedConfig {
   using S = typename Observer::scalar_type;  ///< type of signals and settings
 
-  typename Observer::Config observer{};  ///< config of the observer
+  [[no_unique_address]] ByName<GuardedConfig> by_name{};  ///< nothing to set, see ByName
+  typename Observer::Config observer{};                   ///< config of the observer
   S disturbance_bound{};  ///< largest abs(dhat); 0: no bound. Unit of y^(n) or u, see `unit`
   DisturbanceUnit unit = DisturbanceUnit::output;  ///< unit of dhat and its bound
   int release_samples = 0;  ///< measurements from the end of a pin until dhat is free, 0 .. 65000
@@ -94,8 +96,9 @@ struct GuardedConfig {
 /// the outermost adapter. KnownModel is excluded, because the proof does not cover fbar, and so are
 /// first-order parts (use `leak_time` instead), because a held constant next to a decaying one is
 /// unstable.
-template <LoopObserver Observer>
-class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<Observer>> {
+template <class Observer>
+requires(detail::goes_into_a_loop<Observer>()) class Guarded
+    : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<Observer>> {
   static_assert(
       observer_traits<Observer>.bears_guards,
       "esokit: Guarded needs a constant gain on the chain of integrators: LinearEso, "
@@ -486,7 +489,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
 };
 
 /// Distinguishes the type in snapshots.
-template <LoopObserver Observer>
+template <class Observer>
 inline constexpr std::uint32_t type_tag<Guarded<Observer>> = make_type_tag<Observer>("Guarded");
 
 }  // namespace esokit

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <esokit/adapter/adapter.hpp>
+#include <esokit/core/check.hpp>
 #include <esokit/core/lanes.hpp>
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/type_tag.hpp>
@@ -29,13 +30,24 @@ concept PlantModel = std::copyable<Model> &&
       { model.validate() } -> std::same_as<Check<typename Observer::scalar_type>>;
     });
 
+namespace detail {
+template <class Model, class Observer>
+consteval bool is_a_term() {
+  static_assert(PlantModel<Model, Observer>,
+                "esokit: KnownModel needs the type of a function fbar(estimate) that returns a "
+                "number, with validate() only if its traits declare it: the concept PlantModel");
+  return PlantModel<Model, Observer>;
+}
+}  // namespace detail
+
 /// Config of KnownModel.
-template <LoopObserver Observer, class Model>
-struct KnownModelConfig {
+template <class Observer, class Model>
+requires(detail::goes_into_a_loop<Observer>()) struct KnownModelConfig {
   using S = typename Observer::scalar_type;  ///< type of signals and settings
 
-  typename Observer::Config observer{};  ///< config of the observer
-  Model model{};                         ///< fbar
+  [[no_unique_address]] ByName<KnownModelConfig> by_name{};  ///< nothing to set, see ByName
+  typename Observer::Config observer{};                      ///< config of the observer
+  Model model{};                                             ///< fbar
 };
 
 /// Observer of y^(n) = fbar(y, ..) + d + b0 u with fbar known. The chain is driven by u + fbar/b0,
@@ -56,10 +68,11 @@ struct KnownModelConfig {
 /// A function that is generic in the scalar, `template <class E> auto operator()(const E& x) const
 /// noexcept` with `select` for branches, can be written in C by `to_c`, too.
 /// @tparam Model your function fbar(estimate)
-template <ShiftableDisturbance Observer, class Model>
-requires PlantModel<Model, Observer>
-class KnownModel : public NamedAdapter<KnownModel<Observer, Model>, Observer,
-                                       KnownModelConfig<Observer, Model>> {
+template <class Observer, class Model>
+requires(detail::shifts_disturbance<Observer>() &&
+         detail::is_a_term<Model, Observer>()) class KnownModel
+    : public NamedAdapter<KnownModel<Observer, Model>, Observer,
+                          KnownModelConfig<Observer, Model>> {
   using Base = NamedAdapter<KnownModel, Observer, KnownModelConfig<Observer, Model>>;
   friend Base;
   friend struct detail::LaneAccess;
@@ -76,7 +89,8 @@ class KnownModel : public NamedAdapter<KnownModel<Observer, Model>, Observer,
 
   /// The same on a scalar that records, see `to_c`: packs of it run one by one.
   template <class T>
-  requires(records<T>) using with_scalar =
+  requires(records<T>&& PlantModel<typename detail::ForScalar<Model, T>::type,
+                                   detail::WithScalar<Observer, T>>) using with_scalar =
       KnownModel<detail::WithScalar<Observer, T>, typename detail::ForScalar<Model, T>::type>;
 
   /// What the adapter can do beyond LoopObserver.
@@ -218,7 +232,7 @@ class KnownModel : public NamedAdapter<KnownModel<Observer, Model>, Observer,
 };
 
 /// Distinguishes the type in snapshots.
-template <ShiftableDisturbance Observer, class Model>
+template <class Observer, class Model>
 inline constexpr std::uint32_t type_tag<KnownModel<Observer, Model>> =
     make_type_tag<Observer, Model>("KnownModel");
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <esokit/adapter/adapter.hpp>
+#include <esokit/core/check.hpp>
 #include <esokit/core/type_tag.hpp>
 #include <esokit/model/measured_input.hpp>
 #include <esokit/model/sampled_model.hpp>
@@ -11,12 +12,13 @@
 namespace esokit {
 
 /// Config of Measured.
-template <LoopObserver Observer, int Count>
-struct MeasuredConfig {
+template <class Observer, int Count>
+requires(detail::goes_into_a_loop<Observer>()) struct MeasuredConfig {
   using S = typename Observer::scalar_type;  ///< type of signals and settings
 
-  typename Observer::Config observer{};     ///< config of the observer
-  Array<MeasuredInput<S>, Count> inputs{};  ///< what each w does
+  [[no_unique_address]] ByName<MeasuredConfig> by_name{};  ///< nothing to set, see ByName
+  typename Observer::Config observer{};                    ///< config of the observer
+  Array<MeasuredInput<S>, Count> inputs{};                 ///< what each w does
   int most_lost = 50;  ///< samples in a row without a good w for which the last one is held, 0 ..
                        ///< 65535; after them it counts as zero, until there is a good one
 };
@@ -47,9 +49,10 @@ struct MeasuredConfig {
 /// Measured goes around VariableTime, not inside: the dead time is then counted in present steps.
 /// @tparam Count number of disturbances that are measured @tparam Delay longest dead time, samples;
 ///         the memory is Delay + 2 scalars each
-template <ShiftableLoad Observer, int Count = 1, int Delay = 0>
-class Measured : public NamedAdapter<Measured<Observer, Count, Delay>, Observer,
-                                     MeasuredConfig<Observer, Count>> {
+template <class Observer, int Count = 1, int Delay = 0>
+requires(detail::shifts_load<Observer>()) class Measured
+    : public NamedAdapter<Measured<Observer, Count, Delay>, Observer,
+                          MeasuredConfig<Observer, Count>> {
   using Base = NamedAdapter<Measured, Observer, MeasuredConfig<Observer, Count>>;
   friend Base;
   friend struct detail::RecordAccess;
@@ -237,7 +240,7 @@ class Measured : public NamedAdapter<Measured<Observer, Count, Delay>, Observer,
 };
 
 /// Distinguishes the type in snapshots.
-template <ShiftableLoad Observer, int Count, int Delay>
+template <class Observer, int Count, int Delay>
 inline constexpr std::uint32_t type_tag<Measured<Observer, Count, Delay>> =
     make_type_tag<Observer>("Measured", Count, Delay);
 

@@ -4,16 +4,18 @@
 
 #include <cstdint>
 #include <esokit/adapter/adapter.hpp>
+#include <esokit/core/check.hpp>
 #include <esokit/core/type_tag.hpp>
 
 namespace esokit {
 
 /// Config of OutlierGate.
-template <LoopObserver Observer>
-struct OutlierGateConfig {
+template <class Observer>
+requires(detail::goes_into_a_loop<Observer>()) struct OutlierGateConfig {
   using S = typename Observer::scalar_type;  ///< type of signals and settings
 
-  typename Observer::Config observer{};  ///< config of the observer
+  [[no_unique_address]] ByName<OutlierGateConfig> by_name{};  ///< nothing to set, see ByName
+  typename Observer::Config observer{};                       ///< config of the observer
   S threshold{};          ///< innovations up to this are accepted, unit of y; 0: no gate
   S running_factor{};     ///< and those up to this times the running mean of abs(innovation)
                           ///< (0.8 standard deviations if Gaussian); 0: threshold only
@@ -33,9 +35,8 @@ struct OutlierGateConfig {
 ///
 /// It can be combined with the other adapters; WrappedOutput must be outside, because it determines
 /// the turn of y. ExtendedStateFilter has its own gate, which uses the variance of the innovation.
-template <LevelledObserver Observer>
-requires RestartingObserver<Observer>
-class OutlierGate
+template <class Observer>
+requires(detail::bears_a_gate<Observer>()) class OutlierGate
     : public NamedAdapter<OutlierGate<Observer>, Observer, OutlierGateConfig<Observer>> {
   using Base = NamedAdapter<OutlierGate, Observer, OutlierGateConfig<Observer>>;
   friend Base;
@@ -165,8 +166,7 @@ class OutlierGate
 };
 
 /// Distinguishes the type in snapshots.
-template <LevelledObserver Observer>
-requires RestartingObserver<Observer>
+template <class Observer>
 inline constexpr std::uint32_t type_tag<OutlierGate<Observer>> =
     make_type_tag<Observer>("OutlierGate");
 

@@ -3,15 +3,17 @@
 #pragma once
 
 #include <esokit/adapter/adapter.hpp>
+#include <esokit/core/check.hpp>
 #include <esokit/core/type_tag.hpp>
 
 namespace esokit {
 
 /// Config of VariableTime.
-template <LoopObserver Observer>
-struct VariableTimeConfig {
+template <class Observer>
+requires(detail::goes_into_a_loop<Observer>()) struct VariableTimeConfig {
   using S = typename Observer::scalar_type;  ///< type of signals and settings
 
+  [[no_unique_address]] ByName<VariableTimeConfig> by_name{};  ///< nothing to set, see ByName
   typename Observer::Config observer{};  ///< config of the observer, with the nominal sample time T
   S ratio = S(4);                        ///< above 1: steps may take T / ratio .. T ratio
 };
@@ -36,8 +38,8 @@ struct VariableTimeConfig {
 /// had the present length; once settled it is exact. The gain sets of a switched observer follow
 /// the step time, but its switching test compares successive innovations regardless of the time
 /// between them.
-template <RestartingObserver Observer>
-class VariableTime
+template <class Observer>
+requires(detail::restarts<Observer>()) class VariableTime
     : public NamedAdapter<VariableTime<Observer>, Observer, VariableTimeConfig<Observer>> {
   using Base = NamedAdapter<VariableTime, Observer, VariableTimeConfig<Observer>>;
   friend Base;
@@ -203,7 +205,7 @@ class VariableTime
 };
 
 /// Distinguishes the type in snapshots.
-template <RestartingObserver Observer>
+template <class Observer>
 inline constexpr std::uint32_t type_tag<VariableTime<Observer>> =
     make_type_tag<Observer>("VariableTime");
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <esokit/adapter/adapter.hpp>
+#include <esokit/core/check.hpp>
 #include <esokit/core/type_tag.hpp>
 #include <limits>
 #include <type_traits>
@@ -12,12 +13,13 @@
 namespace esokit {
 
 /// Config of WrappedOutput.
-template <LoopObserver Observer>
-struct WrappedOutputConfig {
+template <class Observer>
+requires(detail::goes_into_a_loop<Observer>()) struct WrappedOutputConfig {
   using S = typename Observer::scalar_type;  ///< type of signals and settings
 
-  typename Observer::Config observer{};  ///< config of the observer
-  S period{};                            ///< period of y in its unit: 2 pi, 360
+  [[no_unique_address]] ByName<WrappedOutputConfig> by_name{};  ///< nothing to set, see ByName
+  typename Observer::Config observer{};                         ///< config of the observer
+  S period{};  ///< period of y in its unit: 2 pi, 360
 };
 
 /// Counts the turns, so that a measurement in any branch (0 .. 2 pi, -180 .. 180) can be used
@@ -50,8 +52,8 @@ struct WrappedOutputConfig {
 ///
 /// An axis that turns by more than half a period a sample cannot be distinguished from a slower
 /// one: the actuator must not be able to drive it so fast.
-template <ShiftableOutput Observer>
-class WrappedOutput
+template <class Observer>
+requires(detail::shifts_output<Observer>()) class WrappedOutput
     : public NamedAdapter<WrappedOutput<Observer>, Observer, WrappedOutputConfig<Observer>> {
   using Base = NamedAdapter<WrappedOutput, Observer, WrappedOutputConfig<Observer>>;
   friend Base;
@@ -357,7 +359,7 @@ class WrappedOutput
 };
 
 /// Distinguishes the type in snapshots.
-template <ShiftableOutput Observer>
+template <class Observer>
 inline constexpr std::uint32_t type_tag<WrappedOutput<Observer>> =
     make_type_tag<Observer>("WrappedOutput");
 

@@ -7,6 +7,7 @@
 #include <esokit/control/control_loop.hpp>
 #include <esokit/control/controller.hpp>
 #include <esokit/control/softening.hpp>
+#include <esokit/core/check.hpp>
 #include <esokit/core/kernels.hpp>
 #include <esokit/core/type_tag.hpp>
 #include <esokit/gain/feedback_gain.hpp>
@@ -15,10 +16,11 @@
 namespace esokit {
 
 /// Config of Adrc, of either form. Give `controller_bandwidth` or `gains`, not both.
-template <LoopObserver Observer>
-struct AdrcConfig {
+template <class Observer>
+requires(detail::goes_into_a_loop<Observer>()) struct AdrcConfig {
   using S = typename Observer::scalar_type;  ///< type of signals and settings
 
+  [[no_unique_address]] ByName<AdrcConfig> by_name{};  ///< nothing to set, see ByName
   typename Observer::Config observer{};  ///< includes T and b0, in both forms that of the plant
   S controller_bandwidth{};              ///< omega_c, rad/s
   std::optional<Array<S, Observer::order>> gains{};  ///< k_0 .. k_(n-1), replace omega_c
@@ -72,8 +74,8 @@ struct AdrcConfig {
 /// put DelayedInput, WrappedOutput, VariableTime or KnownModel around it. They can be nested, with
 /// DelayedInput outside KnownModel.
 /// @tparam Form OutputBased or ErrorBased
-template <LoopObserver Observer, class Form = OutputBased>
-class Adrc {
+template <class Observer, class Form = OutputBased>
+requires(detail::goes_into_a_loop<Observer>()) class Adrc {
   static constexpr bool error_based = std::is_same_v<Form, ErrorBased>;
   static_assert(AdrcForm<Form>, "esokit: the form is OutputBased or ErrorBased");
 
@@ -100,7 +102,7 @@ class Adrc {
   /// Checks the settings and does all the design work.
   /// @return the controller, or an error that names the field
   static Expected<Adrc, Error<S>> make(const Config& config) {
-    detail::refuse_packs<S>();
+    static_assert(detail::refuses_packs<S>());
     const auto observer = Observer::make(observer_config(config));
     if (!observer) return observer.error();
     const auto law = make_law(config, *observer);
@@ -454,7 +456,7 @@ class Adrc {
 };
 
 /// Distinguishes the type in snapshots.
-template <LoopObserver Observer, class Form>
+template <class Observer, class Form>
 inline constexpr std::uint32_t type_tag<Adrc<Observer, Form>> =
     make_type_tag<Observer, Form>("Adrc");
 

@@ -39,11 +39,12 @@ concept AdrcForm = std::is_same_v<Form, OutputBased> || std::is_same_v<Form, Err
 ///
 /// A function of the estimate, without state, for sampled and continuous observers.
 /// @tparam Order n
-template <int Order, Scalar S = double>
-class AdrcLaw {
+template <int Order, class S = double>
+requires(detail::is_a_scalar<S>()) class AdrcLaw {
  public:
   /// Give `controller_bandwidth` or `gains`, not both.
   struct Config {
+    [[no_unique_address]] ByName<Config> by_name{};  ///< nothing to set, see ByName
     S controller_bandwidth{};  ///< omega_c, rad/s: k_i = C(n, i) omega_c^(n-i)
     std::optional<Array<S, Order>>
         gains{};     ///< k_0 .. k_(n-1) for r - y, r' - y', ..; k_i in 1/s^(n-i)
@@ -54,7 +55,7 @@ class AdrcLaw {
   /// Checks the settings and does all the design work.
   /// @return the law, or an error that names the field
   static Expected<AdrcLaw, Error<S>> make(const Config& config) {
-    detail::refuse_packs<S>();
+    static_assert(detail::refuses_packs<S>());
     Rules<S> rules;
     if (!rules.invertible("input_gain", config.input_gain)) return rules.error();
     AdrcLaw law;

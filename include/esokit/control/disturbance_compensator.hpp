@@ -4,16 +4,19 @@
 
 #include <esokit/control/control_loop.hpp>
 #include <esokit/control/controller.hpp>
+#include <esokit/core/check.hpp>
 #include <esokit/core/type_tag.hpp>
 #include <limits>
 
 namespace esokit {
 
 /// Config of DisturbanceCompensator.
-template <LoopObserver Observer>
-struct DisturbanceCompensatorConfig {
+template <class Observer>
+requires(detail::goes_into_a_loop<Observer>()) struct DisturbanceCompensatorConfig {
   using S = typename Observer::scalar_type;  ///< type of signals and settings
 
+  [[no_unique_address]] ByName<DisturbanceCompensatorConfig>
+      by_name{};                         ///< nothing to set, see ByName
   typename Observer::Config observer{};  ///< includes b0 and T
   std::optional<S> compensation_gain{};  ///< K, unit of u per unit of y^(n); left out: -1/b0
   Limits<S> limits{};                    ///< of the actuator
@@ -40,8 +43,8 @@ struct DisturbanceCompensatorConfig {
 /// disturbance, call `start(y, u)` and set the controller's output to `base_output()`: u then
 /// continues without a bump. Pass `output() - compensation()` to the controller's anti-windup as
 /// the applied u0.
-template <LoopObserver Observer>
-class DisturbanceCompensator {
+template <class Observer>
+requires(detail::goes_into_a_loop<Observer>()) class DisturbanceCompensator {
  public:
   static constexpr int order = Observer::order;        ///< n, order of the plant
   using scalar_type = typename Observer::scalar_type;  ///< type of signals and settings
@@ -62,7 +65,7 @@ class DisturbanceCompensator {
   /// Checks the settings and does all the design work.
   /// @return the compensator, or an error that names the field
   static Expected<DisturbanceCompensator, Error<S>> make(const Config& config) {
-    detail::refuse_packs<S>();
+    static_assert(detail::refuses_packs<S>());
     const auto observer = Observer::make(config.observer);
     if (!observer) return observer.error();
     const S input_gain = observer->input_gain();
@@ -224,7 +227,7 @@ class DisturbanceCompensator {
 };
 
 /// Distinguishes the type in snapshots.
-template <LoopObserver Observer>
+template <class Observer>
 inline constexpr std::uint32_t type_tag<DisturbanceCompensator<Observer>> =
     make_type_tag<Observer>("DisturbanceCompensator");
 

@@ -53,8 +53,8 @@ namespace esokit {
 /// `update` from phase `done` on, before the first of them `applied(u)` with the u that the
 /// experiment gave last. `examples/identify` shows this.
 /// @tparam Order n, 1 or 2
-template <int Order, PlainScalar S = double>
-class Experiment {
+template <int Order, class S = double>
+requires(detail::is_a_plain_scalar<S>()) class Experiment {
   static_assert(Order == 1 || Order == 2, "esokit: an experiment is of order 1 or 2");
 
  public:

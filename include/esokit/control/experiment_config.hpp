@@ -29,7 +29,8 @@ struct ExperimentApproach {
 /// Config of Experiment.
 template <PlainScalar S = double>
 struct ExperimentConfig {
-  S sample_time{};                            ///< T, s
+  [[no_unique_address]] ByName<ExperimentConfig> by_name{};  ///< nothing to set, see ByName
+  S sample_time{};                                           ///< T, s
   Excitation excitation = Excitation::relay;  ///< relay: needs no knowledge of the machine
   S input{};        ///< u0, unit of u: holds the machine where it starts; 0 of a cold heater
   S amplitude{};    ///< A, unit of u; negative if a larger u lowers y. With an approach A is the

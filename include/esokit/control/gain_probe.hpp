@@ -17,6 +17,7 @@ namespace esokit {
 /// Config of GainProbe.
 template <PlainScalar S = double>
 struct GainProbeConfig {
+  [[no_unique_address]] ByName<GainProbeConfig> by_name{};  ///< nothing to set, see ByName
   S observer_bandwidth{};  ///< omega_o, rad/s: magnitude of the observer's poles, or their mean
   S sample_time{};         ///< T, s; omega_o T is at most 1
   S amplitude{};           ///< A, unit of u: several times the u that overcomes friction
@@ -47,8 +48,8 @@ struct GainProbeResult {
 /// next sample; before the next update tell the loop, `loop.applied(applied)`. After the end or an
 /// abort it is the u of the loop.
 /// @tparam Size N, number of states of the observer
-template <int Size, PlainScalar S = double>
-class GainProbe {
+template <int Size, class S = double>
+requires(detail::is_a_plain_scalar<S>()) class GainProbe {
   static_assert(Size >= 2, "esokit: an observer has at least two states");
 
  public:

@@ -17,6 +17,7 @@ namespace esokit {
 /// Config of HealthMonitor.
 template <PlainScalar S = double>
 struct HealthConfig {
+  [[no_unique_address]] ByName<HealthConfig> by_name{};  ///< nothing to set, see ByName
   S observer_bandwidth{};  ///< omega_o, rad/s: magnitude of the observer's poles, or their mean
   S sample_time{};         ///< T, s
   S input_range{};         ///< half the range between the limits of the actuator, unit of u; keep
@@ -152,8 +153,8 @@ requires(model_traits<Model>.tells_constant) inline constexpr int simulated_lag<
 /// simulated output of the actuator.
 /// @tparam Size number of poles that filter phi: N of the observer, minus the order of an
 /// actuator's lag
-template <int Size, PlainScalar S = double>
-class HealthMonitor {
+template <int Size, class S = double>
+requires(detail::is_a_plain_scalar<S>()) class HealthMonitor {
   static_assert(Size >= 2, "esokit: an observer has at least two states");
 
  public:

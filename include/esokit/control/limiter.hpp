@@ -37,7 +37,7 @@ class Limiter {
   /// @return error for limits that are crossed or not finite, a rate or sample time that is not
   ///         positive, or a rate that the scalar cannot hold beside the limits
   static Expected<Limiter, Error<S>> make(const Limits<S>& limits, const S& sample_time) {
-    detail::refuse_packs<S>();
+    static_assert(detail::refuses_packs<S>());
     Rules<S> rules;
     rules.positive("sample_time", sample_time)
         .finite("limits.lower", limits.lower)

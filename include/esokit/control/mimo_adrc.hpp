@@ -6,6 +6,7 @@
 #include <esokit/control/control_loop.hpp>
 #include <esokit/control/controller.hpp>
 #include <esokit/control/limiter.hpp>
+#include <esokit/core/check.hpp>
 #include <esokit/core/unroll.hpp>
 #include <esokit/gain/feedback_gain.hpp>
 #include <esokit/math/dense.hpp>
@@ -20,9 +21,10 @@
 namespace esokit {
 
 /// Config of MimoAdrc.
-template <ShiftableDisturbance... Observers>
-struct MimoAdrcConfig {
-  static constexpr int channels = sizeof...(Observers);  ///< q
+template <class... Observers>
+requires(...&& detail::shifts_disturbance<Observers>()) struct MimoAdrcConfig {
+  [[no_unique_address]] ByName<MimoAdrcConfig> by_name{};  ///< nothing to set, see ByName
+  static constexpr int channels = sizeof...(Observers);    ///< q
   using S =
       typename std::tuple_element_t<0, std::tuple<Observers...>>::scalar_type;  ///< type of signals
   using InputMatrix = Matrix<S, channels, channels>;                            ///< B0, q x q
@@ -52,8 +54,8 @@ struct MimoAdrcConfig {
 /// An actuator in the model of a channel is a lag of (B0 u)_i. This is correct if all actuators
 /// have the same lag, or if B0 does not couple them.
 /// @tparam Observers one observer type for each channel, all with the same scalar
-template <ShiftableDisturbance... Observers>
-class MimoAdrc {
+template <class... Observers>
+requires(...&& detail::shifts_disturbance<Observers>()) class MimoAdrc {
   using Channels = std::tuple<Observers...>;
   using First = std::tuple_element_t<0, Channels>;
   template <int Channel>

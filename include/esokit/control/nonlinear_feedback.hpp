@@ -17,11 +17,12 @@ namespace esokit {
 /// For finite arguments u is finite: a result that overflows, such as a power of a large error, is
 /// replaced by the largest number of its sign. For limits add a Limiter.
 /// @tparam Order n
-template <int Order, Scalar S = double>
-class NonlinearFeedback {
+template <int Order, class S = double>
+requires(detail::is_a_scalar<S>()) class NonlinearFeedback {
  public:
   /// Settings of make.
   struct Config {
+    [[no_unique_address]] ByName<Config> by_name{};  ///< nothing to set, see ByName
     Array<S, Order> gains = filled(S(1.0));          ///< k_i >= 0, i = 0 .. n - 1
     Array<S, Order> exponents = filled(S(1.0));      ///< a_i > 0; 1 is linear
     Array<S, Order> linear_widths = filled(S(1.0));  ///< delta_i > 0, unit of y^(i)
@@ -34,7 +35,7 @@ class NonlinearFeedback {
   /// Checks the settings and does all the design work.
   /// @return the law, or an error that names the field
   static Expected<NonlinearFeedback, Error<S>> make(const Config& config) {
-    detail::refuse_packs<S>();
+    static_assert(detail::refuses_packs<S>());
     Rules<S> rules;
     for (int i = 0; i < Order; ++i) {
       const auto row = static_cast<std::size_t>(i);

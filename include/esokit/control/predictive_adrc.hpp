@@ -9,6 +9,7 @@
 #include <esokit/control/adrc_law.hpp>
 #include <esokit/control/controller.hpp>
 #include <esokit/control/limiter.hpp>
+#include <esokit/core/check.hpp>
 #include <esokit/core/kernels.hpp>
 #include <esokit/core/type_tag.hpp>
 #include <esokit/gain/gain_law.hpp>
@@ -27,10 +28,11 @@ enum class PredictivePhase : unsigned char { prepared, measured, missing };
 }  // namespace detail
 
 /// Config of PredictiveAdrc. Give `controller_bandwidth` or `gains`, not both.
-template <PredictableObserver Observer>
-struct PredictiveAdrcConfig {
-  using S = typename Observer::scalar_type;      ///< type of signals and settings
-  static constexpr int order = Observer::order;  ///< n, order of the plant
+template <class Observer>
+requires(detail::foretells<Observer>()) struct PredictiveAdrcConfig {
+  using S = typename Observer::scalar_type;                      ///< type of signals and settings
+  [[no_unique_address]] ByName<PredictiveAdrcConfig> by_name{};  ///< nothing to set, see ByName
+  static constexpr int order = Observer::order;                  ///< n, order of the plant
 
   typename Observer::Config observer{};    ///< includes b0 and T
   S controller_bandwidth{};                ///< omega_c, rad/s: k_i = C(n, i) omega_c^(n-i)
@@ -69,8 +71,8 @@ struct PredictiveAdrcConfig {
 ///
 /// Calls other than make and retune only multiply and add, except in the observer's gain law (the
 /// division of a filter, the power of fal). No call allocates, throws or locks.
-template <PredictableObserver Observer>
-class PredictiveAdrc {
+template <class Observer>
+requires(detail::foretells<Observer>()) class PredictiveAdrc {
  public:
   static constexpr int order = Observer::order;        ///< n, order of the plant
   using scalar_type = typename Observer::scalar_type;  ///< type of signals and settings
@@ -437,7 +439,7 @@ class PredictiveAdrc {
 };
 
 /// Distinguishes the type in snapshots.
-template <PredictableObserver Observer>
+template <class Observer>
 inline constexpr std::uint32_t type_tag<PredictiveAdrc<Observer>> =
     make_type_tag<Observer>("PredictiveAdrc");
 

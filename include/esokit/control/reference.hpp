@@ -10,6 +10,16 @@
 
 namespace esokit {
 
+namespace detail {
+template <int Order, int Count>
+consteval bool is_a_reference() {
+  static_assert(Count <= Order + 1,
+                "esokit: a reference has r and at most as many derivatives as the plant has order: "
+                "{r, r1, .., rn}");
+  return true;
+}
+}  // namespace detail
+
 /// (r, r', .., r^(n)), made from a number if r is constant, or from up to n + 1 elements, as a list
 /// `{r, r1}` or as a vector (of Eigen, too), if it moves; the others are zero. A tracking
 /// differentiator or a profile gives such a vector.
@@ -24,17 +34,16 @@ class Reference {
 
   /// A list; or a constant of another type, for a scalar that is no plain number.
   template <std::convertible_to<S>... Rows>
-  requires(sizeof...(Rows) > 1 || (sizeof...(Rows) == 1 && !PlainScalar<S>))  //
+  requires(detail::is_a_reference<Order, sizeof...(Rows)>() &&
+           (sizeof...(Rows) > 1 || (sizeof...(Rows) == 1 && !PlainScalar<S>)))  //
       ESOKIT_INLINE constexpr Reference(const Rows&... rows) noexcept
-      : rows_{static_cast<S>(rows)...}, moves_(sizeof...(Rows) > 1) {
-    static_assert(sizeof...(Rows) <= Order + 1, "esokit: the reference is (r, r', .., r^(n))");
-  }
+      : rows_{static_cast<S>(rows)...}, moves_(sizeof...(Rows) > 1) {}
 
   /// A vector.
   template <detail::VectorOf<S> Given>
   ESOKIT_INLINE constexpr Reference(const Given& given) noexcept : moves_(true) {
     constexpr int Count = detail::vector_size<Given>;
-    static_assert(Count <= Order + 1, "esokit: the reference is (r, r', .., r^(n))");
+    static_assert(detail::is_a_reference<Order, Count>());
     const Vector<S, Count>& rows = given;
     for (int i = 0; i < Count; ++i) rows_[i] = rows(i);
   }

@@ -65,8 +65,9 @@ inline constexpr std::array<double, 4> smooth_step_peaks = [] {
 }();
 
 /// Config of SmoothProfile.
-template <int Order, PlainScalar S = double>
-struct SmoothProfileConfig {
+template <int Order, class S = double>
+requires(detail::is_a_plain_scalar<S>()) struct SmoothProfileConfig {
+  [[no_unique_address]] ByName<SmoothProfileConfig> by_name{};  ///< nothing to set, see ByName
   Array<S, Order> limits{};  ///< largest abs(r'), .., abs(r^(n)), unit of the reference / s^i;
                              ///< 0: none. The last one is needed
   S shortest_time{};         ///< no move takes less, s; 0: none
@@ -84,8 +85,8 @@ struct SmoothProfileConfig {
 /// A target that changes during a move is taken up at the end of the move: the profile does not
 /// stop or turn in between. For a reference that never rests use a TrackingDifferentiator, or give
 /// the law your own derivatives.
-template <int Order, PlainScalar S = double>
-class SmoothProfile {
+template <int Order, class S = double>
+requires(detail::is_a_plain_scalar<S>()) class SmoothProfile {
  public:
   static constexpr int order = Order;            ///< n
   static constexpr bool runs_on = true;          ///< a refused target does not stop a move

@@ -29,6 +29,8 @@ template <PlainScalar S>
 /// Config of TrackingDifferentiator.
 template <Scalar S>
 struct TrackingDifferentiatorConfig {
+  [[no_unique_address]] ByName<TrackingDifferentiatorConfig>
+      by_name{};     ///< nothing to set, see ByName
   S acceleration{};  ///< R > 0, unit of the reference / s^2
   S sample_time{};   ///< h, s
   S filter_time{};   ///< h0 >= h, s: smooths a noisy reference; 0: h
@@ -37,8 +39,8 @@ struct TrackingDifferentiatorConfig {
 /// Tracking differentiator with fhan: r1 follows the reference as fast as |r1''| <= `acceleration`
 /// allows, and r2 = r1'. Because it can always stop in time, it stays r2^2 / (2R) behind a moving
 /// reference.
-template <Scalar S = double>
-class TrackingDifferentiator {
+template <class S = double>
+requires(detail::is_a_scalar<S>()) class TrackingDifferentiator {
  public:
   using scalar_type = S;                           ///< type of signals and settings
   using Config = TrackingDifferentiatorConfig<S>;  ///< settings of make

@@ -19,6 +19,31 @@ using Check = Expected<void, Error<S>>;
 
 namespace detail {
 
+struct AnyMember;
+template <class...>
+inline constexpr bool takes_names_only = false;
+
+}  // namespace detail
+
+/// The first member of a config, which takes no room. With it the values of a config have names,
+/// `{.observer_bandwidth = 100.0, ..}`: a list without names does not compile, as numbers in
+/// another order would.
+/// @tparam Config the struct itself, so that no two at one address are of one type
+template <class Config>
+struct ByName {
+  constexpr ByName() = default;
+  /// Does not compile.
+  template <class... Values>
+  requires(sizeof...(Values) > 0 &&
+           !(std::same_as<Values, detail::AnyMember> || ...)) constexpr ByName(const Values&...) {
+    static_assert(detail::takes_names_only<Values...>,
+                  "esokit: write the names of the settings, {.observer_bandwidth = 100.0, ..}: "
+                  "without them nobody sees a wrong order");
+  }
+};
+
+namespace detail {
+
 /// Smallest positive normal number of the scalar; for autodiff types that of double.
 template <Scalar S>
 constexpr S smallest_normal() noexcept {
@@ -230,10 +255,11 @@ namespace detail {
 
 /// In a `make`: packs have another one.
 template <class S>
-constexpr void refuse_packs() noexcept {
+consteval bool refuses_packs() {
   static_assert(
       !PackScalar<S>,
       "esokit: packs are made lane by lane: Packed<LinearEso<2>, 4>::make (core/packed.hpp)");
+  return true;
 }
 
 /// `retune` of every type that has `make` and `adopt`.

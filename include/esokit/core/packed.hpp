@@ -172,7 +172,7 @@ class Packed : public detail::PackedTraits<
 
   /// Checks the settings and does all the design work, lane by lane.
   /// @param config lane -> its Config @return the pack, or an error that names field and lane
-  template <class Function>
+  template <std::invocable<int> Function>
   static Expected<Packed, Error<One>> make(const Function& config) {
     const Expected<T, Error<One>> first = T::make(config(0));
     if (!first) return of(first.error(), 0);
@@ -183,6 +183,13 @@ class Packed : public detail::PackedTraits<
       all.set(i, *one);
     }
     return all;
+  }
+  /// Does not compile: there is no common config.
+  template <class Lane = T>
+  static Expected<Packed, Error<One>> make(const typename Lane::Config&) {
+    static_assert(!std::same_as<Lane, T>,
+                  "esokit: Packed::make takes a function that gives each lane its config: "
+                  "make([](int lane) { return Config{..}; })");
   }
 
   /// New settings while running: taken by all lanes or, on an error, by none.

@@ -177,6 +177,21 @@ concept Scalar = std::copyable<T> && requires(const T a, const T b) {
   { select(a < b, a, b) } -> std::convertible_to<T>;
 } && DeclaresItsLanes<T>;
 
+namespace detail {
+template <class T>
+consteval bool is_a_scalar() {
+  static_assert(Scalar<T>,
+                "esokit: the scalar is float or double, or a type of numbers of your own with all "
+                "that the concept Scalar lists; it has no integers");
+  return Scalar<T>;
+}
+template <class T>
+consteval bool is_a_plain_scalar() {
+  static_assert(PlainScalar<T>, "esokit: the scalar here is float, double or long double");
+  return PlainScalar<T>;
+}
+}  // namespace detail
+
 /// A scalar that holds several numbers.
 template <class S>
 concept PackScalar = Scalar<S> &&(lane_count<S> > 1);

@@ -157,6 +157,16 @@ concept GainLaw = std::copyable<Law> && requires(const Law& law, const S& innova
   noexcept->std::convertible_to<ScaledGain<Size, S>>;
 } && detail::GainLawAsDeclared<Law, Size, S> && detail::HasNoMisspelledHook<Law>;
 
+namespace detail {
+template <class Law, int Size, class S>
+consteval bool is_a_gain_law() {
+  static_assert(GainLaw<Law, Size, S>,
+                "esokit: a gain law has `gain(e) const noexcept` with a gain for each state, and "
+                "each hook that it has is declared in its `traits`, with the right signature");
+  return GainLaw<Law, Size, S>;
+}
+}  // namespace detail
+
 /// A gain law whose gain is known before the measurement.
 template <class Law, int Size, class S>
 concept PresetGainLaw = GainLaw<Law, Size, S> && gain_law_traits<Law>

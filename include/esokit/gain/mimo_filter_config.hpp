@@ -13,6 +13,8 @@ namespace esokit {
 /// Config of MimoExtendedStateFilter.
 template <class Orders, int Inputs, Scalar S, int Extension>
 struct MimoExtendedStateFilterConfig {
+  [[no_unique_address]] ByName<MimoExtendedStateFilterConfig>
+      by_name{};                                                  ///< nothing to set, see ByName
   static constexpr int outputs = Orders::count;                   ///< p
   static constexpr int size = Orders::sum + outputs * Extension;  ///< N
   using Covariance = Matrix<S, size, size>;                       ///< N x N

@@ -52,10 +52,20 @@ concept EvenGain = std::copyable<Shape> && requires(const Shape& k, const S& x) 
 } && DeclaresTraits<Shape, EvenGainTraits> && ChecksAsDeclared<Shape, S> &&
     PreparesAsDeclared<Shape, S>;
 
+namespace detail {
+template <class Shape, class S>
+consteval bool is_an_even_gain() {
+  static_assert(EvenGain<Shape, S>,
+                "esokit: a nonlinear gain is the type of a function k(e) that returns a number, "
+                "and declares in its `traits` what else it has: the concept EvenGain");
+  return EvenGain<Shape, S>;
+}
+}  // namespace detail
+
 /// k(x) = K_alpha x^(alpha-1) + K_beta x^beta: g(e) / e of the NHOESO paper, (10). The default is k
 /// = 1, which makes the observer linear.
-template <Scalar S>
-struct PowerSumGain {
+template <class S>
+requires(detail::is_a_scalar<S>()) struct PowerSumGain {
   static constexpr EvenGainTraits traits{.validates = true, .prepares = true};  ///< besides k
   template <class T>
   using with_scalar = PowerSumGain<T>;  ///< the same with another scalar

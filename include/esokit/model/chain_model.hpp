@@ -12,8 +12,8 @@ namespace esokit {
 /// The model y^(n) = d + b0 u with d^(m) = 0, sampled at T.
 ///
 /// States are those of ScaledChain.
-template <int Order, Scalar S = double, int Extension = 1>
-class ChainModel {
+template <int Order, class S = double, int Extension = 1>
+requires(detail::is_a_scalar<S>()) class ChainModel {
   using Chain = ScaledChain<Order, S, Extension>;
   static constexpr int N = Order + Extension;
 

@@ -24,8 +24,8 @@ namespace esokit {
 /// `with_lag`, `with_sensor` and `with_dead_time` add an actuator, a sensor or a delay to an
 /// existing plant.
 /// @tparam States length of x @tparam Inputs, Outputs lengths of u and y; d is as long as u
-template <int States, Scalar ScalarType = double, int Inputs = 1, int Outputs = 1>
-struct LinearPlant {
+template <int States, class ScalarType = double, int Inputs = 1, int Outputs = 1>
+requires(detail::is_a_scalar<ScalarType>()) struct LinearPlant {
   static_assert(States >= 1 && Inputs >= 1 && Outputs >= 1);
 
   static constexpr int states = States;    ///< length of x

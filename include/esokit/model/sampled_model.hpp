@@ -95,4 +95,14 @@ concept SampledModel = std::copyable<Model> && DeclaresTraits<Model, ModelTraits
   { Model::state_of_row(0) } -> std::same_as<int>;
 };
 
+namespace detail {
+template <class Model, class S>
+consteval bool is_a_sampled_model() {
+  static_assert(SampledModel<Model, S>,
+                "esokit: a model predicts, is scaled and tells its rest as the concept "
+                "SampledModel lists, and declares in its `traits` what else it has");
+  return SampledModel<Model, S>;
+}
+}  // namespace detail
+
 }  // namespace esokit

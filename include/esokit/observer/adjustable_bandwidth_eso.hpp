@@ -5,6 +5,7 @@
 /// 106742).
 #pragma once
 
+#include <esokit/core/check.hpp>
 #include <esokit/core/type_tag.hpp>
 #include <esokit/gain/switched_gain.hpp>
 #include <esokit/gain/switching_certificate.hpp>
@@ -25,9 +26,9 @@ namespace esokit {
 /// rho = 1 is LinearEso, bit for bit.
 /// @tparam Order n @tparam S scalar @tparam Extension m
 /// @tparam Reading meaning of "shrinks"; `printed` is for comparison with the paper only
-template <int Order, Scalar S = double, int Extension = 1,
+template <int Order, class S = double, int Extension = 1,
           SignReading Reading = SignReading::magnitude>
-class AdjustableBandwidthEso
+requires(detail::is_a_scalar<S>()) class AdjustableBandwidthEso
     : public NamedObserver<
           AdjustableBandwidthEso<Order, S, Extension, Reading>,
           PredictorCorrector<Order, S, Extension,
@@ -40,15 +41,21 @@ class AdjustableBandwidthEso
  public:
   /// Settings of make.
   struct Config {
-    S observer_bandwidth{};                     ///< omega_o, rad/s
-    S bandwidth_ratio = S(1.0);                 ///< rho > 0
-    SwitchingRule rule = SwitchingRule::abeso;  ///< abeso or beso
-    bool allow_uncertified_switching = false;   ///< accept a ratio without a certificate
+    [[no_unique_address]] ByName<Config> by_name{};  ///< nothing to set, see ByName
+    S observer_bandwidth{};                          ///< omega_o, rad/s
+    S bandwidth_ratio = S(1.0);                      ///< rho > 0
+    SwitchingRule rule = SwitchingRule::abeso;       ///< abeso or beso
+    bool allow_uncertified_switching = false;        ///< accept a ratio without a certificate
     S input_gain{};     ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
     S sample_time{};    ///< T, s
     int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts, see
                         ///< `max_gap()`
   };
+
+  /// As NamedObserver says. Not a template, so that compilers name a setting that does not exist.
+  static Expected<AdjustableBandwidthEso, Error<S>> make(const Config& config) {
+    return AdjustableBandwidthEso::NamedObserver::template make<AdjustableBandwidthEso>(config);
+  }
   template <class T>
   using with_scalar =
       AdjustableBandwidthEso<Order, T, Extension, Reading>;  ///< the same with another scalar

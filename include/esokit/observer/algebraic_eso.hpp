@@ -4,6 +4,7 @@
 /// Journal of Control 23 (2021) 2171-2184).
 #pragma once
 
+#include <esokit/core/check.hpp>
 #include <esokit/core/type_tag.hpp>
 #include <esokit/gain/algebraic_gain_design.hpp>
 #include <esokit/observer/named_observer.hpp>
@@ -26,8 +27,8 @@ namespace esokit {
 /// is bridged with the gain for the whole gap at the present bandwidth.
 ///
 /// @tparam Order n @tparam S scalar @tparam Extension m
-template <int Order, Scalar S = double, int Extension = 1>
-class AlgebraicEso
+template <int Order, class S = double, int Extension = 1>
+requires(detail::is_a_scalar<S>()) class AlgebraicEso
     : public NamedObserver<
           AlgebraicEso<Order, S, Extension>,
           PredictorCorrector<Order, S, Extension, AlgebraicGain<Order + Extension, S>>> {
@@ -54,7 +55,8 @@ class AlgebraicEso
 
   /// Settings of make.
   struct Config {
-    S observer_bandwidth{};  ///< lambda, rad/s: the final bandwidth
+    [[no_unique_address]] ByName<Config> by_name{};  ///< nothing to set, see ByName
+    S observer_bandwidth{};                          ///< lambda, rad/s: the final bandwidth
     S frequency_shift{};  ///< q >= 0, rad/s: how fast the bandwidth falls to it; 0: as lambda + N/t
     S input_gain{};       ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
     S sample_time{};      ///< T, s
@@ -72,6 +74,11 @@ class AlgebraicEso
     int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts, see
                         ///< `max_gap()`
   };
+
+  /// As NamedObserver says. Not a template, so that compilers name a setting that does not exist.
+  static Expected<AlgebraicEso, Error<S>> make(const Config& config) {
+    return AlgebraicEso::NamedObserver::template make<AlgebraicEso>(config);
+  }
 
   /// One sample, see PredictorCorrector::update.
   [[gnu::__flatten__]] StatusType update(S y, S u_applied) noexcept {

@@ -3,6 +3,7 @@
 /// Transactions 109 (2021) 1-10).
 #pragma once
 
+#include <esokit/core/check.hpp>
 #include <esokit/core/type_tag.hpp>
 #include <esokit/gain/constant_gain.hpp>
 #include <esokit/observer/named_observer.hpp>
@@ -16,8 +17,9 @@ namespace esokit {
 /// @tparam Settings settings of a model other than the chain
 template <int Size, int Levels, Scalar S, class Placement, class Settings = NoModelSettings>
 struct CascadeEsoConfig {
-  S observer_bandwidth{};  ///< omega_o1 of level 1, rad/s
-  S bandwidth_factor{};    ///< alpha > 1: omega_oi = alpha omega_o(i-1); leave out for one level
+  [[no_unique_address]] ByName<CascadeEsoConfig> by_name{};  ///< nothing to set, see ByName
+  S observer_bandwidth{};                                    ///< omega_o1 of level 1, rad/s
+  S bandwidth_factor{};  ///< alpha > 1: omega_oi = alpha omega_o(i-1); leave out for one level
   std::optional<Array<S, Levels>> level_bandwidths{};  ///< omega_oi, rad/s; replaces the two above
   S input_gain{};   ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
   S sample_time{};  ///< T, s
@@ -29,6 +31,7 @@ struct CascadeEsoConfig {
 /// Settings of CascadeEso by poles.
 template <int Size, int Levels, Scalar S, ListsPoles Placement, class Settings>
 struct CascadeEsoConfig<Size, Levels, S, Placement, Settings> {
+  [[no_unique_address]] ByName<CascadeEsoConfig> by_name{};  ///< nothing to set, see ByName
   /// p_i of each level, 1/s; for a pack common to all lanes
   Array<typename Placement::template Spec<Size, LaneScalar<S>>, Levels> level_poles{};
   S input_gain{};                          ///< b0, unit of y^(n) per unit of u; not zero
@@ -143,6 +146,11 @@ class CascadeEso : public NamedObserver<
   template <class T>
   using with_scalar =
       CascadeEso<Order, Levels, T, Extension, Placement, detail::WithScalar<Model, T>>;
+
+  /// As NamedObserver says. Not a template, so that compilers name a setting that does not exist.
+  static Expected<CascadeEso, Error<S>> make(const Config& config) {
+    return CascadeEso::NamedObserver::template make<CascadeEso>(config);
+  }
 
  private:
   static auto design(const Config& config, const Model& model) {

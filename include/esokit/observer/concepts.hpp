@@ -342,4 +342,61 @@ concept SampledLinearObserver = ObserverAsDeclared<O> && observer_traits<O>
   observer.model().increment();
 };
 
+namespace detail {
+
+/// What a class template demands of its arguments, in a sentence: a constraint of it alone begins
+/// its error with the template's heading, and says at the end what is meant. @{
+template <class O>
+consteval bool goes_into_a_loop() {
+  static_assert(LoopObserver<O>,
+                "esokit: controllers and adapters take the type of an observer, such as "
+                "LinearEso<2>, with all that LoopObserver lists and declared in its traits");
+  return LoopObserver<O>;
+}
+template <class O>
+consteval bool foretells() {
+  static_assert(PredictableObserver<O>,
+                "esokit: PredictiveAdrc needs an observer that knows its next correction before "
+                "the measurement: a LinearEso, CascadeEso, .., in no adapter but Measured");
+  return PredictableObserver<O>;
+}
+template <class O>
+consteval bool restarts() {
+  static_assert(RestartingObserver<O>,
+                "esokit: VariableTime needs an observer that tells when it restarts, such as "
+                "LinearEso<2>: the concept RestartingObserver");
+  return RestartingObserver<O>;
+}
+template <class O>
+consteval bool shifts_output() {
+  static_assert(ShiftableOutput<O>,
+                "esokit: WrappedOutput needs an observer whose y may be shifted, such as "
+                "LinearEso<2> without a plant's poles: the concept ShiftableOutput");
+  return ShiftableOutput<O>;
+}
+template <class O>
+consteval bool bears_a_gate() {
+  static_assert(LevelledObserver<O> && RestartingObserver<O>,
+                "esokit: OutlierGate needs an observer with level_estimate and restarts, such as "
+                "LinearEso<2>: the concepts LevelledObserver and RestartingObserver");
+  return LevelledObserver<O> && RestartingObserver<O>;
+}
+template <class O>
+consteval bool shifts_disturbance() {
+  static_assert(ShiftableDisturbance<O>,
+                "esokit: KnownModel and MimoAdrc need an observer whose disturbance may be "
+                "shifted, such as LinearEso<2>: the concept ShiftableDisturbance");
+  return ShiftableDisturbance<O>;
+}
+template <class O>
+consteval bool shifts_load() {
+  static_assert(ShiftableLoad<O>,
+                "esokit: Measured needs an observer that can be told a load, such as LinearEso<2>: "
+                "the concept ShiftableLoad");
+  return ShiftableLoad<O>;
+}
+/// @}
+
+}  // namespace detail
+
 }  // namespace esokit

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <concepts>
 #include <cstdint>
+#include <esokit/core/check.hpp>
 #include <esokit/core/type_tag.hpp>
 #include <esokit/gain/constant_gain.hpp>
 #include <esokit/gain/filter_design.hpp>
@@ -95,6 +96,7 @@ class ExtendedStateFilter
 
   /// Settings of make.
   struct Config {
+    [[no_unique_address]] ByName<Config> by_name{};  ///< nothing to set, see ByName
     S input_gain{};            ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
     S sample_time{};           ///< T, s
     S measurement_variance{};  ///< R >= 0, unit of y squared; 0: y is exact; encoder: step^2 / 12
@@ -150,6 +152,11 @@ class ExtendedStateFilter
       return weights;
     }
   };
+
+  /// As NamedObserver says. Not a template, so that compilers name a setting that does not exist.
+  static Expected<ExtendedStateFilter, Error<S>> make(const Config& config) {
+    return ExtendedStateFilter::NamedObserver::template make<ExtendedStateFilter>(config);
+  }
 
   using StatusType = StatusOf<S>;  ///< StepStatus, for a pack one per lane
   template <class T>

@@ -3,6 +3,7 @@
 /// ESO (GESO).
 #pragma once
 
+#include <esokit/core/check.hpp>
 #include <esokit/core/type_tag.hpp>
 #include <esokit/gain/constant_gain.hpp>
 #include <esokit/observer/named_observer.hpp>
@@ -14,6 +15,7 @@ namespace esokit {
 /// @tparam Settings settings of a model other than the chain
 template <int Size, Scalar S, class Placement, class Settings = NoModelSettings>
 struct LinearEsoConfig {
+  [[no_unique_address]] ByName<LinearEsoConfig> by_name{};  ///< nothing to set, see ByName
   S observer_bandwidth{};  ///< omega_o, rad/s: all poles at exp(-omega_o T), or as the placement
                            ///< says
   S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
@@ -26,6 +28,7 @@ struct LinearEsoConfig {
 /// Settings of LinearEso by poles.
 template <int Size, Scalar S, ListsPoles Placement, class Settings>
 struct LinearEsoConfig<Size, S, Placement, Settings> {
+  [[no_unique_address]] ByName<LinearEsoConfig> by_name{};  ///< nothing to set, see ByName
   /// p_i, 1/s, N poles in the left half plane, complex ones in conjugate pairs; for a pack common
   /// to all lanes
   typename Placement::template Spec<Size, LaneScalar<S>> poles{};
@@ -62,6 +65,11 @@ class LinearEso
   /// The same with another scalar.
   template <class T>
   using with_scalar = LinearEso<Order, T, Extension, Placement, detail::WithScalar<Model, T>>;
+
+  /// As NamedObserver says. Not a template, so that compilers name a setting that does not exist.
+  static Expected<LinearEso, Error<S>> make(const Config& config) {
+    return LinearEso::NamedObserver::template make<LinearEso>(config);
+  }
 
  private:
   static auto design(const Config& config, const Model& model) {

@@ -13,6 +13,16 @@
 
 namespace esokit {
 
+namespace detail {
+template <int States, ModelParts Parts>
+consteval bool has_states() {
+  static_assert(States >= 1 && (Parts.states == 0 || Parts.states == States),
+                "esokit: PlantEso needs the number of states of its plant, 1 or more, first: "
+                "PlantEso<3, ModelParts{.order = 2}>");
+  return States >= 1 && (Parts.states == 0 || Parts.states == States);
+}
+}  // namespace detail
+
 /// LinearEso with a model of actuator, sensor, plant poles or the frequencies of the disturbance:
 ///
 /// ```cpp
@@ -51,12 +61,12 @@ constexpr ModelParts of_plant(ModelParts parts, int states) noexcept {
 ///                       .model = {.plant = plant, .resonators = {{{.frequency = 314}}}}});
 /// ```
 template <int States, ModelParts Parts, Scalar S = double, class Placement = EqualPoles>
-requires(States >= 1 && (Parts.states == 0 || Parts.states == States))  //
+requires(detail::has_states<States, Parts>())  //
     using PlantEso = ModelEso<detail::of_plant(Parts, States), S, Placement>;
 
 /// CascadeEso with the same model.
 template <int States, ModelParts Parts, int Levels, Scalar S = double, class Placement = EqualPoles>
-requires(States >= 1 && (Parts.states == 0 || Parts.states == States))  //
+requires(detail::has_states<States, Parts>())  //
     using PlantCascadeEso = ModelCascadeEso<detail::of_plant(Parts, States), Levels, S, Placement>;
 
 /// The parts of a disturbance at the present time, each in the unit of d: that of y^(n), or with

@@ -48,7 +48,7 @@ class NamedObserver : public Base {
       static_assert(Base::order >= 1, "esokit: the plant order must be at least 1");
       return Error<scalar_type>{};
     } else {
-      detail::refuse_packs<scalar_type>();
+      static_assert(detail::refuses_packs<scalar_type>());
       using Model = typename Base::PlantModel;
       // The chain is checked first: laws divide by what it checks.
       if (auto ok = Base::check_chain({config.input_gain, config.sample_time, config.max_gap}); !ok)
@@ -74,8 +74,9 @@ class NamedObserver : public Base {
 
   /// From checked parts: the config, for observers that store more than their laws, and the
   /// arguments of the constructor of `Base`.
-  template <class Config, class... Parts>
-  NamedObserver(const Config&, const Parts&... parts) noexcept : Base(parts...) {}
+  template <class Config, class Part, class... Parts>
+  NamedObserver(const Config&, const Part& part, const Parts&... parts) noexcept
+      : Base(part, parts...) {}
 };
 
 }  // namespace esokit

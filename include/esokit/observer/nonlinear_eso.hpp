@@ -4,6 +4,7 @@
 /// it is the observer of J. Han).
 #pragma once
 
+#include <esokit/core/check.hpp>
 #include <esokit/core/type_tag.hpp>
 #include <esokit/gain/nonlinear_gain_design.hpp>
 #include <esokit/observer/named_observer.hpp>
@@ -28,9 +29,8 @@ namespace esokit {
 /// which a search for the worst sequence found no growth.
 /// @tparam Order n @tparam S scalar @tparam Extension m
 /// @tparam Shape an EvenGain: PowerSumGain (the paper's g), FalGain, or your own function object
-template <int Order, Scalar S = double, int Extension = 2, class Shape = PowerSumGain<S>>
-requires EvenGain<Shape, S>
-class NonlinearEso
+template <int Order, class S = double, int Extension = 2, class Shape = PowerSumGain<S>>
+requires(detail::is_a_scalar<S>() && detail::is_an_even_gain<Shape, S>()) class NonlinearEso
     : public NamedObserver<
           NonlinearEso<Order, S, Extension, Shape>,
           PredictorCorrector<Order, S, Extension, NonlinearGain<Order + Extension, S, Shape>>> {
@@ -43,6 +43,7 @@ class NonlinearEso
  public:
   /// Settings of make.
   struct Config {
+    [[no_unique_address]] ByName<Config> by_name{};  ///< nothing to set, see ByName
     S observer_bandwidth{};       ///< omega_o, rad/s: the poles are at exp(-omega_o T) for k = 1
     Shape shape{};                ///< k(|e| / error_scale)
     S error_scale = S(1.0);       ///< unit of y: what counts as an error of one
@@ -55,6 +56,11 @@ class NonlinearEso
     int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts, see
                         ///< `max_gap()`
   };
+
+  /// As NamedObserver says. Not a template, so that compilers name a setting that does not exist.
+  static Expected<NonlinearEso, Error<S>> make(const Config& config) {
+    return NonlinearEso::NamedObserver::template make<NonlinearEso>(config);
+  }
   template <class T>
   using with_scalar =
       NonlinearEso<Order, T, Extension,

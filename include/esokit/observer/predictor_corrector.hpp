@@ -60,10 +60,11 @@ Check<S> check_chain(const ChainConfig<S>& config) {
 /// @tparam Order n, order of the plant @tparam Extension m, extended states
 /// @tparam Law gain law, see GainLaw @tparam Levels p
 /// @tparam Model what is known of the plant, see ChainModel
-template <int Order, Scalar S, int Extension, class Law, int Levels = 1,
+template <int Order, class S, int Extension, class Law, int Levels = 1,
           class Model = ChainModel<Order, S, Extension>>
-requires GainLaw<Law, Order + Extension, S> && SampledModel<Model, S>
-class PredictorCorrector : public ObservedLevels<Order, S, Extension, Law, Levels, Model> {
+requires(detail::is_a_gain_law<Law, Order + Extension, S>() &&
+         detail::is_a_sampled_model<Model, S>()) class PredictorCorrector
+    : public ObservedLevels<Order, S, Extension, Law, Levels, Model> {
   static_assert(Levels == 1 || model_traits<Model>.adds_levels ||
                     model_traits<Model>.tells_disturbance,
                 "esokit: a cascade needs a model that separates the disturbance: "

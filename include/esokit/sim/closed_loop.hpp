@@ -153,6 +153,7 @@ struct ContinuousLoop {
 
   /// Settings of run.
   struct Config {
+    [[no_unique_address]] ByName<Config> by_name{};    ///< nothing to set, see ByName
     ScalarType duration{};                             ///< s, a whole multiple of `step`
     ScalarType step{};                                 ///< s
     ScalarType start_time{};                           ///< s
@@ -256,8 +257,9 @@ struct SampledLoop {
 
   /// Settings of run.
   struct Config {
-    ScalarType duration{};       ///< s, a whole multiple of `sample_time`
-    ScalarType sample_time{};    ///< T, s; that of the observer
+    [[no_unique_address]] ByName<Config> by_name{};  ///< nothing to set, see ByName
+    ScalarType duration{};                           ///< s, a whole multiple of `sample_time`
+    ScalarType sample_time{};                        ///< T, s; that of the observer
     int substeps = 1;            ///< integration steps of the plant per sample, 1 or more
     ScalarType start_time{};     ///< s
     ScalarType initial_input{};  ///< u that was held before the start

@@ -150,6 +150,8 @@ class NamedContinuousObserver : public Base {
 /// Settings of ContinuousLinearEso by bandwidth.
 template <int Size, Scalar S, class Placement>
 struct ContinuousLinearEsoConfig {
+  [[no_unique_address]] ByName<ContinuousLinearEsoConfig>
+      by_name{};           ///< nothing to set, see ByName
   S observer_bandwidth{};  ///< omega_o, rad/s: all poles at -omega_o, or as the placement says
   S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero
 };
@@ -157,6 +159,8 @@ struct ContinuousLinearEsoConfig {
 /// Settings of ContinuousLinearEso by poles.
 template <int Size, Scalar S, ListsPoles Placement>
 struct ContinuousLinearEsoConfig<Size, S, Placement> {
+  [[no_unique_address]] ByName<ContinuousLinearEsoConfig>
+      by_name{};  ///< nothing to set, see ByName
   /// p_i, 1/s, N poles in the left half plane, complex ones in conjugate pairs
   typename Placement::template Spec<Size, S> poles{};
   S input_gain{};  ///< b0, unit of y^(n) per unit of u; not zero
@@ -190,6 +194,8 @@ using ContinuousHalfGainEso = ContinuousLinearEso<Order, S, Extension, HalfGainP
 /// Settings of ContinuousCascadeEso by bandwidths.
 template <int Size, int Levels, Scalar S, class Placement>
 struct ContinuousCascadeEsoConfig {
+  [[no_unique_address]] ByName<ContinuousCascadeEsoConfig>
+      by_name{};           ///< nothing to set, see ByName
   S observer_bandwidth{};  ///< omega_o1 of level 1, rad/s
   S bandwidth_factor{};    ///< alpha > 1: omega_oi = alpha omega_o(i-1); leave out for one level
   std::optional<Array<S, Levels>> level_bandwidths{};  ///< omega_oi, rad/s; replaces the two above
@@ -199,6 +205,8 @@ struct ContinuousCascadeEsoConfig {
 /// Settings of ContinuousCascadeEso by poles.
 template <int Size, int Levels, Scalar S, ListsPoles Placement>
 struct ContinuousCascadeEsoConfig<Size, Levels, S, Placement> {
+  [[no_unique_address]] ByName<ContinuousCascadeEsoConfig>
+      by_name{};  ///< nothing to set, see ByName
   Array<typename Placement::template Spec<Size, S>, Levels>
       level_poles{};  ///< p_i of each level, 1/s
   S input_gain{};     ///< b0, unit of y^(n) per unit of u; not zero
@@ -246,6 +254,7 @@ class ContinuousAdjustableBandwidthEso
  public:
   /// Settings of make.
   struct Config {
+    [[no_unique_address]] ByName<Config> by_name{};     ///< nothing to set, see ByName
     S observer_bandwidth{};                             ///< omega_o, rad/s
     S bandwidth_ratio = S(1.0);                         ///< rho > 0
     SwitchingRule rule = SwitchingRule::abeso;          ///< abeso or beso
@@ -288,9 +297,10 @@ class ContinuousAlgebraicEso
  public:
   /// Settings of make.
   struct Config {
-    S observer_bandwidth{};  ///< lambda >= 0, rad/s
-    S frequency_shift{};     ///< q >= 0, rad/s
-    S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero
+    [[no_unique_address]] ByName<Config> by_name{};  ///< nothing to set, see ByName
+    S observer_bandwidth{};                          ///< lambda >= 0, rad/s
+    S frequency_shift{};                             ///< q >= 0, rad/s
+    S input_gain{};                                  ///< b0, unit of y^(n) per unit of u; not zero
   };
 
  private:
@@ -321,6 +331,7 @@ class ContinuousNonlinearEso
  public:
   /// Settings of make.
   struct Config {
+    [[no_unique_address]] ByName<Config> by_name{};  ///< nothing to set, see ByName
     S observer_bandwidth{};               ///< omega_o, rad/s: the poles are at -omega_o for k = 1
     Shape shape{};                        ///< k(|e| / error_scale)
     S error_scale = S(1.0);               ///< unit of y: what counts as an error of one

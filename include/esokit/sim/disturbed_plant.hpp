@@ -43,6 +43,7 @@ class DisturbedPlant {
 
   /// Settings of make.
   struct Config {
+    [[no_unique_address]] ByName<Config> by_name{};  ///< nothing to set, see ByName
     Linear plant{};             ///< without dead time, which an ODE cannot have
     Disturbance disturbance{};  ///< d(t)
   };

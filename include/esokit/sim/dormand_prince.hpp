@@ -56,6 +56,7 @@ class VariableStep {
 
   /// Settings of make.
   struct Config {
+    [[no_unique_address]] ByName<Config> by_name{};                 ///< nothing to set, see ByName
     ScalarType relative_tolerance = static_cast<ScalarType>(1e-3);  ///< below 1
     ScalarType absolute_tolerance = static_cast<ScalarType>(1e-6);  ///< unit of the state
   };

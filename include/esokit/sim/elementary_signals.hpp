@@ -56,8 +56,9 @@ class Step {
  public:
   /// Settings of make.
   struct Config {
-    ScalarType time{};   ///< start, s
-    ScalarType size{1};  ///< height
+    [[no_unique_address]] ByName<Config> by_name{};  ///< nothing to set, see ByName
+    ScalarType time{};                               ///< start, s
+    ScalarType size{1};                              ///< height
   };
 
   /// Refuses members that are not finite.
@@ -92,10 +93,11 @@ class Sine {
  public:
   /// Settings of make.
   struct Config {
-    ScalarType amplitude{1};          ///< peak, in the unit of the signal
-    ScalarType angular_frequency{1};  ///< rad/s
-    ScalarType phase{};               ///< rad
-    ScalarType offset{};              ///< mean value
+    [[no_unique_address]] ByName<Config> by_name{};  ///< nothing to set, see ByName
+    ScalarType amplitude{1};                         ///< peak, in the unit of the signal
+    ScalarType angular_frequency{1};                 ///< rad/s
+    ScalarType phase{};                              ///< rad
+    ScalarType offset{};                             ///< mean value
   };
 
   /// Refuses members that are not finite.

@@ -27,9 +27,10 @@ class FilteredStep {
  public:
   /// Settings of make.
   struct Config {
-    ScalarType time{};            ///< start, s
-    ScalarType size{1};           ///< final value
-    ScalarType time_constant{1};  ///< tau of each lag, s
+    [[no_unique_address]] ByName<Config> by_name{};  ///< nothing to set, see ByName
+    ScalarType time{};                               ///< start, s
+    ScalarType size{1};                              ///< final value
+    ScalarType time_constant{1};                     ///< tau of each lag, s
   };
 
   /// Refuses members that are not finite and a time constant that is not positive.

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <esokit/core/check.hpp>
 #include <esokit/core/lanes.hpp>
 #include <esokit/core/scalar.hpp>
 #include <limits>
@@ -15,8 +16,9 @@ namespace esokit::sim {
 
 /// The samples that a Measure uses, and the limit for its result.
 struct MeasureOptions {
-  double from = 0.0;                                    ///< s, time of the first sample used
-  double to = std::numeric_limits<double>::infinity();  ///< s, time of the last sample used
+  [[no_unique_address]] ByName<MeasureOptions> by_name{};  ///< nothing to set, see ByName
+  double from = 0.0;                                       ///< s, time of the first sample used
+  double to = std::numeric_limits<double>::infinity();     ///< s, time of the last sample used
 
   /// The result must not be above this; finite, or left out.
   double limit = std::numeric_limits<double>::infinity();

@@ -625,14 +625,14 @@ class MonteCarlo {
 ///        that of a run. It must be a pure function, and may return a Check, whose error makes the
 ///        run fail.
 template <SampledPlant P, class C, class Vary>
-requires ControllerOf<C, P> MonteCarlo<P, C, Vary> monte_carlo(
+requires(detail::is_a_controller<C, P>()) MonteCarlo<P, C, Vary> monte_carlo(
     P plant, C controller, std::type_identity_t<MonteCarloConfig<P, C>> config, Vary vary) {
   return {std::move(plant), std::move(controller), std::move(config), std::move(vary)};
 }
 
 /// The same without `vary`: the runs differ only by the random numbers of the loop.
 template <SampledPlant P, class C>
-requires ControllerOf<C, P> MonteCarlo<P, C> monte_carlo(
+requires(detail::is_a_controller<C, P>()) MonteCarlo<P, C> monte_carlo(
     P plant, C controller, std::type_identity_t<MonteCarloConfig<P, C>> config) {
   return {std::move(plant), std::move(controller), std::move(config), {}};
 }

@@ -6,6 +6,7 @@
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
+#include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/packed.hpp>
 #include <esokit/sim/counted_gaussian.hpp>
@@ -108,7 +109,8 @@ template <class P, class C>
 struct MonteCarloConfig {
   using Time = typename RunTypes<P, C>::Time;  ///< type of times
 
-  std::int64_t runs{};     ///< number of runs, 1 or more
+  [[no_unique_address]] ByName<MonteCarloConfig> by_name{};  ///< nothing to set, see ByName
+  std::int64_t runs{};                                       ///< number of runs, 1 or more
   RunConfig<P, C> loop{};  ///< settings of every run, with the common seed; leave out its `number`
   int threads = 0;         ///< 0: one per core
 

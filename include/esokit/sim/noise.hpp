@@ -17,8 +17,9 @@ class WhiteNoise {
  public:
   /// Settings of make.
   struct Config {
-    ScalarType standard_deviation{};  ///< in the unit of the signal; zero: no noise
-    std::uint64_t seed = 0;           ///< any number
+    [[no_unique_address]] ByName<Config> by_name{};  ///< nothing to set, see ByName
+    ScalarType standard_deviation{};                 ///< in the unit of the signal; zero: no noise
+    std::uint64_t seed = 0;                          ///< any number
   };
 
   /// Refuses a standard deviation that is negative or not finite.
@@ -56,6 +57,7 @@ class BandLimitedWhiteNoise {
  public:
   /// Settings of make.
   struct Config {
+    [[no_unique_address]] ByName<Config> by_name{};  ///< nothing to set, see ByName
     ScalarType power{};      ///< height of the two-sided power spectral density; zero is no noise
     ScalarType hold{1};      ///< interval, s
     std::uint64_t seed = 0;  ///< any number
@@ -101,6 +103,7 @@ class HeldNoise {
  public:
   /// Settings of make.
   struct Config {
+    [[no_unique_address]] ByName<Config> by_name{};  ///< nothing to set, see ByName
     ScalarType power{};      ///< height of the two-sided power spectral density; zero is no noise
     ScalarType hold{1};      ///< interval of one value, s; a whole multiple of `step`
     ScalarType step{1};      ///< step of the simulation, s

@@ -357,9 +357,10 @@ class Run {
 /// @return the end of the run; or an error that names the field of the config, or `plant`,
 ///         `controller`, `disturbance` or `sensor` with the time at which its result was not finite
 template <SampledPlant P, class C, class Callback>
-requires ControllerOf<C, P> Expected<RunEnd<P, C>, Error<typename RunTypes<P, C>::Time>> run(
-    const P& plant, C controller, const std::type_identity_t<RunConfig<P, C>>& config,
-    Callback&& on_sample) {
+requires(detail::is_a_controller<C, P>())
+    Expected<RunEnd<P, C>, Error<typename RunTypes<P, C>::Time>> run(
+        const P& plant, C controller, const std::type_identity_t<RunConfig<P, C>>& config,
+        Callback&& on_sample) {
   using Types = RunTypes<P, C>;
   using S = typename Types::S;
   using Time = typename Types::Time;
@@ -427,8 +428,9 @@ requires ControllerOf<C, P> Expected<RunEnd<P, C>, Error<typename RunTypes<P, C>
 
 /// The same, with a recording of all samples.
 template <SampledPlant P, class C>
-requires ControllerOf<C, P> Expected<Recording<P, C>, Error<typename RunTypes<P, C>::Time>> run(
-    const P& plant, C controller, const std::type_identity_t<RunConfig<P, C>>& config) {
+requires(detail::is_a_controller<C, P>())
+    Expected<Recording<P, C>, Error<typename RunTypes<P, C>::Time>> run(
+        const P& plant, C controller, const std::type_identity_t<RunConfig<P, C>>& config) {
   RunRecord<P, C> record;
   auto end = run(plant, std::move(controller), config,
                  [&](const auto& sample, const C& now) { record.add(sample, now); });

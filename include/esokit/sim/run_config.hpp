@@ -5,6 +5,7 @@
 #include <concepts>
 #include <cstdint>
 #include <esokit/control/controller.hpp>
+#include <esokit/core/check.hpp>
 #include <esokit/core/lanes.hpp>
 #include <esokit/model/linear_plant.hpp>
 #include <esokit/sim/plant.hpp>
@@ -85,6 +86,16 @@ concept ControllerOf =
                ScalarOrVector<typename RunTypes<P, C>::ControllerScalar, RunTypes<P, C>::outputs>,
                ScalarOrVector<typename RunTypes<P, C>::ControllerScalar, RunTypes<P, C>::inputs>>;
 
+namespace detail {
+template <class C, class P>
+consteval bool is_a_controller() {
+  static_assert(ControllerOf<C, P>,
+                "esokit: a controller for this plant has u = update(y, r) or is a function "
+                "u = controller(y, r), of as many numbers as the plant has outputs and inputs");
+  return ControllerOf<C, P>;
+}
+}  // namespace detail
+
 /// Settings of `run`; all but `duration` may be left out.
 template <class P, class C>
 struct RunConfig {
@@ -93,7 +104,8 @@ struct RunConfig {
   using Input = typename Types::Input;    ///< u
   using Output = typename Types::Output;  ///< y
 
-  Time duration{};     ///< s, a whole multiple of the sample time
+  [[no_unique_address]] ByName<RunConfig> by_name{};  ///< nothing to set, see ByName
+  Time duration{};                                    ///< s, a whole multiple of the sample time
   Time sample_time{};  ///< T, s; must agree with the controller's, if that has one; left out: that
                        ///< of the controller
 

@@ -15,15 +15,17 @@ class Series {
  public:
   /// Settings of make: samples at given times.
   struct Config {
-    std::span<const ScalarType> times{};   ///< s, finite, never descending
-    std::span<const ScalarType> values{};  ///< finite, as many as times
+    [[no_unique_address]] ByName<Config> by_name{};  ///< nothing to set, see ByName
+    std::span<const ScalarType> times{};             ///< s, finite, never descending
+    std::span<const ScalarType> values{};            ///< finite, as many as times
   };
 
   /// Settings of make_uniform: samples with a constant step.
   struct UniformConfig {
-    ScalarType start{};                    ///< time of the first value, s
-    ScalarType sample_time{1};             ///< s, positive
-    std::span<const ScalarType> values{};  ///< finite
+    [[no_unique_address]] ByName<UniformConfig> by_name{};  ///< nothing to set, see ByName
+    ScalarType start{};                                     ///< time of the first value, s
+    ScalarType sample_time{1};                              ///< s, positive
+    std::span<const ScalarType> values{};                   ///< finite
   };
 
   /// Refuses sizes that differ (the value of the error is then the number of times), times that

@@ -17,9 +17,10 @@ class StepResponse {
  public:
   /// Settings of make.
   struct Config {
-    ScalarType initial_value{};  ///< value before the step
-    ScalarType final_value{1};   ///< value after it, not equal to the initial one
-    ScalarType step_time{};      ///< s
+    [[no_unique_address]] ByName<Config> by_name{};  ///< nothing to set, see ByName
+    ScalarType initial_value{};                      ///< value before the step
+    ScalarType final_value{1};  ///< value after it, not equal to the initial one
+    ScalarType step_time{};     ///< s
     ScalarType band =
         static_cast<ScalarType>(0.02L);  ///< settling band, as a fraction of the step, positive
     ScalarType rise_from =

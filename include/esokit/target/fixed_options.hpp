@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <esokit/core/check.hpp>
 #include <esokit/target/fixed_bounds.hpp>
 #include <esokit/target/integer_list.hpp>
 #include <esokit/target/recorded_design.hpp>
@@ -25,9 +26,10 @@ struct FixedCode;
 
 /// How a design is to be written in fixed point.
 struct FixedPointOptions {
-  CountedSignal y{};         ///< the measurement
-  CountedSignal u{};         ///< what the actuator held
-  int innovation_bits = 32;  ///< 16 (fewer instructions) or 32
+  [[no_unique_address]] ByName<FixedPointOptions> by_name{};  ///< nothing to set, see ByName
+  CountedSignal y{};                                          ///< the measurement
+  CountedSignal u{};                                          ///< what the actuator held
+  int innovation_bits = 32;                                   ///< 16 (fewer instructions) or 32
 
   /// For each estimate what rounding may do at most, in its unit; not given or zero: what half a
   /// count of y does.

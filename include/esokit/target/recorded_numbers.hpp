@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <esokit/core/check.hpp>
 #include <esokit/target/list_writer.hpp>
 #include <esokit/target/recorder.hpp>
 #include <string>
@@ -12,6 +13,7 @@ namespace esokit {
 
 /// How a text of another language is to be written.
 struct CodeOptions {
+  [[no_unique_address]] ByName<CodeOptions> by_name{};  ///< nothing to set, see ByName
   std::string name = "controller";  ///< begins every name and the files: an identifier of C
   std::string comment{};            ///< at the head: which machine, which design; no marks of a
                                     ///< comment

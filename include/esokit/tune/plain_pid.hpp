@@ -12,9 +12,10 @@ namespace esokit {
 
 /// Settings of a PlainPid.
 struct PlainPidConfig {
-  double proportional = 0.0;       ///< K_p, unit of u per unit of y
-  double integral = 0.0;           ///< K_i, unit of K_p per s
-  double derivative = 0.0;         ///< K_d, unit of K_p times s
+  [[no_unique_address]] ByName<PlainPidConfig> by_name{};  ///< nothing to set, see ByName
+  double proportional = 0.0;                               ///< K_p, unit of u per unit of y
+  double integral = 0.0;                                   ///< K_i, unit of K_p per s
+  double derivative = 0.0;                                 ///< K_d, unit of K_p times s
   double derivative_filter = 0.0;  ///< T_f of a filter of first order on the derivative, s; 0: none
   double filter_frequency = 0.0;   ///< of a filter of second order on y, rad/s; 0: none
   double filter_damping = 0.707;   ///< of this filter
