@@ -18,6 +18,7 @@
 #include <sstream>
 #include <string>
 #include <support/refusal.hpp>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -162,8 +163,7 @@ void cuts_give_the_whole(const P& of_plant, const C& of_controller,
   for (int k = 0; k < 3; ++k) {
     StudyRecords part;
     ASSERT_TRUE(one.run_part(part, {k, 3}, largest, mean_input));
-    if (k == 0) part.write_head(text);
-    for (const auto& [block, record] : part.blocks()) StudyRecords::write(text, record);
+    part.write(text);
   }
   const auto joined = one.outcome(read(text.str()).value(), largest, mean_input);
   ASSERT_TRUE(joined) << refusal(joined);
@@ -200,36 +200,33 @@ TEST(StudyRecords, AnyKindOfStudyMayBeCut) {
 // Wherever a file ends, its whole records are kept and no other.
 TEST(StudyRecords, KeepsWhatIsWholeOfATextThatIsCutOff) {
   const std::string text = text_of(all_records());
-  const std::size_t head = text.find("block ");
   std::vector<std::size_t> ends;  // of the records
   for (std::size_t at = text.find("\nend "); at != std::string::npos;
        at = text.find("\nend ", at + 1)) {
     ends.push_back(text.find('\n', at + 1));
   }
   ASSERT_EQ(ends.size(), 3u);
-  for (std::size_t length = 0; length < text.size(); length += length < head + 50 ? 1 : 97) {
+  for (std::size_t length = 0; length < text.size(); length += length < 150 ? 1 : 97) {
     const auto part = read(text.substr(0, length));
-    if (length < head) {
-      EXPECT_EQ(refusal(part), "records: must begin as esokit wrote them: esokit-runs 1 ..");
-      continue;
-    }
-    ASSERT_TRUE(part) << length;
+    ASSERT_TRUE(part) << length << refusal(part);
     const auto whole_ones =
         std::count_if(ends.begin(), ends.end(), [&](std::size_t end) { return end <= length; });
     EXPECT_EQ(part->blocks().size(), static_cast<std::size_t>(whole_ones)) << length;
-    EXPECT_EQ(part->missing().size(), 3 - static_cast<std::size_t>(whole_ones));
+    EXPECT_EQ(part->identity().runs, whole_ones > 0 ? runs : 0) << length;
+    StudyRecords joined(all_records().identity());
+    ASSERT_TRUE(joined.add(*part));
+    EXPECT_EQ(joined.missing().size(), 3 - static_cast<std::size_t>(whole_ones));
   }
 }
 
 // A byte that changed on the way leaves out a record or refuses the text; no result changes.
 TEST(StudyRecords, NeverTakesAChangedRecord) {
   const std::string text = text_of(all_records());
-  const std::size_t head = text.find("block ");
   std::mt19937 dice(2);
   int refused = 0, left_out = 0;
   for (int i = 0; i < 400; ++i) {
     std::string changed = text;
-    const std::size_t at = head + dice() % (text.size() - head);
+    const std::size_t at = dice() % text.size();
     switch (i % 3) {
       case 0:
         changed[at] = static_cast<char>(dice() % 256);
@@ -289,7 +286,7 @@ TEST(StudyRecords, GoesOnWhereItWasKilled) {
   // Another file by mistake: it stays.
   file.put("time,y\n");
   EXPECT_EQ(refusal(study().run_part(file.name, {}, largest, mean_input)),
-            "records: must begin as esokit wrote them: esokit-runs 1 ..");
+            "records: must begin as esokit wrote them: esokit-runs 2 ..");
   EXPECT_EQ(file.text(), "time,y\n");
   EXPECT_EQ(refusal(study().run_part("/nowhere/records", {}, largest, mean_input)),
             "file: cannot be written");
@@ -321,11 +318,13 @@ TEST(StudyRecords, RefusesForeignOnes) {
     return said;
   };
   const char* another =
-      "records.study: is another one: other program, plant, controller, settings or seed";
+      "records.study: is another one: its program, plant, controller or settings differ from those "
+      "of";
   const char* measures = "records.measures: must be those of the study";
   Config of = config();
   of.loop.seed = 53;
-  EXPECT_EQ(answer(study(of), largest, mean_input), another);
+  EXPECT_EQ(answer(study(of), largest, mean_input),
+            "records.seed: must be the seed of the study, which is");
   of = config();
   of.loop.noise = 1.001e-2;
   EXPECT_EQ(answer(study(of), largest, mean_input), another);
@@ -351,12 +350,13 @@ TEST(StudyRecords, RefusesForeignOnes) {
   StudyRecords elsewhere(identity);
   StudyRecords here = own;
   const char* machine =
-      "records.machine: is of another kind: its exp, sin or pow, or its sums of products, differ";
+      "records.machine: is of another kind: its exp, sin or pow, or its sums of products, differ "
+      "from those of";
   EXPECT_EQ(refusal(here.add(elsewhere)), machine);
   EXPECT_EQ(refusal(study().run_part(elsewhere, {}, largest, mean_input)), machine);
   // Not of a study at all.
   EXPECT_EQ(refusal(read("time,y,u\n1,2,3\n")),
-            "records: must begin as esokit wrote them: esokit-runs 1 ..");
+            "records: must begin as esokit wrote them: esokit-runs 2 ..");
   // Settings are refused as by `run`.
   of.runs = 0;
   StudyRecords none;
@@ -383,14 +383,124 @@ TEST(StudyRecords, RefusesABlockWithTwoResults) {
   // Two records in one file.
   std::ostringstream text;
   text << text_of(all_records());
-  StudyRecords::write(text, all_records().blocks().at(2));
-  EXPECT_EQ(read(text.str())->blocks().size(), 3u);
+  all_records().write(text, all_records().blocks().at(2));
+  EXPECT_EQ(refusal(read(text.str())), "records.block: is there twice: join each part once");
+  text.str({});
+  text << text_of(all_records());
   block = all_records().blocks().at(2);
   sums = block.numbers[0].sums();
   sums.mean = std::nextafter(sums.mean, 9.0);
   block.numbers[0].set_sums(sums);
-  StudyRecords::write(text, block);
+  all_records().write(text, block);
   EXPECT_EQ(refusal(read(text.str())), "records.block: is there twice, and differs");
+}
+
+/// The text of a part.
+std::string part_text(const sim::Part& part, const Config& of = config()) {
+  StudyRecords records;
+  study(of).run_part(records, part, largest, mean_input).value();
+  return text_of(records);
+}
+
+// `cat` of files: which study a record is of, it says itself.
+TEST(StudyRecords, AreJoinedByCatInAnyOrder) {
+  std::vector<std::string> parts;
+  for (int k = 0; k < 3; ++k) parts.push_back(part_text({k, 3}));
+  std::vector<int> order{0, 1, 2};
+  do {
+    std::string all;
+    for (const int k : order) all += parts[static_cast<std::size_t>(k)];
+    const auto joined = read(all);
+    ASSERT_TRUE(joined) << refusal(joined);
+    EXPECT_TRUE(joined->blocks() == all_records().blocks());
+    expect_same(study().outcome(*joined, largest, mean_input).value(), whole());
+  } while (std::next_permutation(order.begin(), order.end()));
+  // The same part twice, at either place.
+  for (const auto& [a, b, c] : {std::tuple{0, 0, 1}, {0, 1, 0}, {2, 1, 1}}) {
+    const auto twice =
+        read(parts.at(static_cast<std::size_t>(a)) + parts.at(static_cast<std::size_t>(b)) +
+             parts.at(static_cast<std::size_t>(c)));
+    EXPECT_EQ(refusal(twice), "records.block: is there twice: join each part once");
+    EXPECT_EQ(twice.error().value, a == 2 ? 1 : 0);
+  }
+  // Lines that passed through Windows, empty lines between.
+  std::string windows;
+  for (const char c : parts[0] + "\n\n" + parts[2] + parts[1]) {
+    if (c == '\n') windows += '\r';
+    windows += c;
+  }
+  const auto from_windows = read(windows);
+  ASSERT_TRUE(from_windows) << refusal(from_windows);
+  EXPECT_EQ(from_windows->damaged(), 0);
+  EXPECT_TRUE(from_windows->blocks() == all_records().blocks());
+  EXPECT_EQ(text_of(*from_windows), text_of(all_records()));
+  // One that was cut off, before another, with or without an end of its last line.
+  for (const char* end : {"", "\n", "\r\n"}) {
+    for (const std::size_t left : {14u, 45u, 70u, 300u}) {
+      const auto cut = read(parts[0].substr(0, left) + end + parts[1] + parts[2]);
+      ASSERT_TRUE(cut) << left << refusal(cut);
+      EXPECT_GE(cut->blocks().size(), *end == 0 ? 1u : 2u) << left;
+      EXPECT_FALSE(cut->blocks().contains(0));
+      for (const auto& [block, record] : cut->blocks()) {
+        EXPECT_TRUE(record == all_records().blocks().at(block));
+      }
+    }
+  }
+}
+
+// Of two studies, whichever comes first, also if what one begins with was cut off.
+TEST(StudyRecords, RefusesTheCatOfTwoStudies) {
+  const std::string own = part_text({0, 3}) + part_text({1, 3});
+  Config of = config();
+  const auto answer = [&](const std::string& foreign) {
+    const auto behind = read(own + foreign), before = read(foreign + own);
+    EXPECT_FALSE(behind);
+    EXPECT_FALSE(before);
+    if (behind || before) return std::string("accepted");
+    EXPECT_EQ(refusal(behind), refusal(before));
+    // Both are named: what is found, and what it should be.
+    EXPECT_TRUE(behind.error().has_limit);
+    EXPECT_EQ(behind.error().value, before.error().limit);
+    EXPECT_EQ(behind.error().limit, before.error().value);
+    EXPECT_NE(behind.error().value, behind.error().limit);
+    // Cut off in its first record, the second one says it.
+    const auto cut = read(own + foreign.substr(foreign.find("sums")));
+    EXPECT_EQ(cut.has_value(), foreign.find("esokit-runs", 20) == std::string::npos);
+    return refusal(behind);
+  };
+  of.loop.seed = 53;
+  EXPECT_EQ(answer(part_text({2, 3}, of)), "records.seed: must be the seed of the study, which is");
+  EXPECT_EQ(answer(part_text({1, 2}, of)), "records.seed: must be the seed of the study, which is");
+  of = config();
+  of.loop.reference = 1.001;
+  EXPECT_EQ(answer(part_text({2, 3}, of)),
+            "records.study: is another one: its program, plant, controller or settings differ from "
+            "those of");
+  of = config();
+  of.runs = runs + 1;
+  EXPECT_EQ(answer(part_text({2, 3}, of)),
+            "records.runs: must be the number of runs of the study, which is");
+  StudyRecords elsewhere = [&] {
+    auto identity = all_records().identity();
+    identity.machine ^= 1;
+    StudyRecords records(identity);
+    EXPECT_TRUE(records.add(all_records().blocks().at(2)));
+    return records;
+  }();
+  EXPECT_EQ(answer(text_of(elsewhere)),
+            "records.machine: is of another kind: its exp, sin or pow, or its sums of products, "
+            "differ from those of");
+  // What version 1 wrote named the study at the head of a file alone.
+  const auto old = read("esokit-runs 1 a62b3c 77de 9195 1\nmeasure 0 u\nblock 0 0\n");
+  EXPECT_EQ(
+      refusal(old),
+      "records.format: is that of another release: compute the parts again, with one of format");
+  EXPECT_EQ(old.error().value, 1);
+  EXPECT_EQ(old.error().limit, 2);
+  const auto behind = read(own + "esokit-runs 1 a62b3c 77de 9195 1\nmeasure 0 u\n");
+  EXPECT_EQ(refusal(behind), refusal(old));
+  std::ifstream nowhere("/nowhere/records");
+  EXPECT_EQ(refusal(StudyRecords::read(nowhere)), "records: cannot be read");
 }
 
 TEST(Part, IsReadFromAText) {

@@ -40,6 +40,14 @@ check "it has the four figures" test "$(grep -c mean whole.txt)" = 4
 for i in 0 1 2; do part "$i/3" "loop$i"; done
 check "three parts by a loop" merged loop2 loop0 loop1
 check "parts of different cuts" merged loop0 whole loop2
+cat loop2 loop0 loop1 >cat
+check "three parts in one file" merged cat
+cat loop0 loop1 loop0 >twice
+check "a part twice in one file" says "records.block = 0: is there twice" "$study" merge --runs "$runs" twice
+"$study" --runs 13001 --part 2/3 --records foreign --threads 1 >part.out
+cat loop0 loop1 foreign >two_studies
+check "one file of two studies" says "records.runs = 13001: must be the number of runs of the study, which is 13000" \
+  "$study" merge --runs "$runs" two_studies
 says_missing=(says "missing: block 1" "$study" merge --runs "$runs" loop0 loop2)
 check "a part is missing" "${says_missing[@]}"
 check "it was block 1 alone" test "$(grep -c missing: says.err)" = 1
@@ -66,6 +74,7 @@ check "is computed again" merged loop0 cut loop2
 
 check "no such part" says "part.index" "$study" --part 3/3 --records none
 check "nor such a file" says "records = 0: must begin" "$study" merge "$0"
+check "nor a file that is not there" says "records = 0: cannot be read" "$study" merge nowhere
 "$study" replay --runs "$runs" 4711 >run.csv
 check "a run alone" test "$(wc -l <run.csv)" = 1001
 

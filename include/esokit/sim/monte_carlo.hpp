@@ -171,7 +171,7 @@ class MonteCarlo {
   template <int Lanes = default_lanes<LaneScalar<typename Types::S>>, class... Reduce, class... F>
   [[nodiscard]] Expected<StudyIdentity, Error<Time>> identity(
       const Measure<Reduce, F>&... measures) const {
-    StudyIdentity of{0, machine_probe(), config_.runs, {}, {}};
+    StudyIdentity of{.machine = machine_probe(), .runs = config_.runs, .seed = config_.loop.seed};
     detail::Hash hash;
     for (const double x :
          {static_cast<double>(config_.loop.duration), static_cast<double>(config_.loop.sample_time),
@@ -239,25 +239,22 @@ class MonteCarlo {
     const auto own = identity<Lanes>(measures...);
     if (!own) return own.error();
     StudyRecords records(*own);
-    std::ostringstream head;
-    records.write_head(head);
-    std::stringstream there;
-    there << std::ifstream(file).rdbuf();
-    // Of a part that was killed at once not even the head may be whole.
-    const bool fresh = head.str().starts_with(there.str());
-    if (!fresh) {
+    std::ifstream there(file);
+    const bool begun = there && there.peek() != std::ifstream::traits_type::eof();
+    if (begun) {
       auto read = StudyRecords::read(there);
       if (!read) return detail::as_error<Time>(read.error());
-      records = *std::move(read);
+      // Of a part that was killed at once not even one record is whole.
+      if (!read->blocks().empty()) records = *std::move(read);
     }
     if (const auto ok = fits(*own, records, part); !ok) return ok.error();
-    std::ofstream out(file, fresh ? std::ios::trunc : std::ios::app);
-    out << (fresh ? head.str() : "\n");  // ends a line that was cut off
+    std::ofstream out(file, records.blocks().empty() ? std::ios::trunc : std::ios::app);
+    if (!records.blocks().empty()) out << '\n';  // ends a line that was cut off
     out.flush();
     const auto ok = run_part<Lanes>(
         records, part,
         [&](const BlockRecord& record) {
-          StudyRecords::write(out, record);
+          records.write(out, record);
           out.flush();
         },
         measures...);

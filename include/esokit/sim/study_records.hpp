@@ -122,23 +122,35 @@ struct StudyIdentity {
   std::uint64_t study = 0;           ///< hash of settings, measures and results of the first runs
   std::uint64_t machine = 0;         ///< `machine_probe()`
   std::int64_t runs = 0;             ///< number of runs of the whole study
+  std::uint64_t seed = 0;            ///< of its random numbers
   std::vector<std::string> names{};  ///< of the measures
   std::vector<double> limits{};      ///< of the measures
 
   /// Whether records of `other` may be joined to those of this study, else an error that says what
-  /// differs.
+  /// differs, with the number of both: of `study` and `machine` the last six digits.
   [[nodiscard]] Check<double> validate(const StudyIdentity& other) const {
     return Rules<double>{}
         .demand(runs == other.runs, {"records.runs", static_cast<double>(other.runs),
                                      "must be the number of runs of the study, which is", -1,
                                      static_cast<double>(runs), true})
+        .demand(seed == other.seed,
+                {"records.seed", static_cast<double>(other.seed),
+                 "must be the seed of the study, which is", -1, static_cast<double>(seed), true})
         .demand(names == other.names && limits == other.limits, "records.measures",
                 static_cast<double>(other.names.size()), "must be those of the study")
-        .demand(machine == other.machine, "records.machine", static_cast<double>(other.machine),
-                "is of another kind: its exp, sin or pow, or its sums of products, differ")
-        .demand(study == other.study, "records.study", static_cast<double>(other.study),
-                "is another one: other program, plant, controller, settings or seed");
+        .demand(machine == other.machine,
+                {"records.machine", last_digits(other.machine),
+                 "is of another kind: its exp, sin or pow, or its sums of products, differ from "
+                 "those of",
+                 -1, last_digits(machine), true})
+        .demand(study == other.study,
+                {"records.study", last_digits(other.study),
+                 "is another one: its program, plant, controller or settings differ from those of",
+                 -1, last_digits(study), true});
   }
+
+ private:
+  static double last_digits(std::uint64_t hash) { return static_cast<double>(hash % 1'000'000); }
 };
 
 /// The results of a block of runs.
@@ -153,9 +165,10 @@ struct BlockRecord {
 
 /// Records of a study, of some of its blocks or of all.
 ///
-/// As text: a line `esokit-runs`, one line for each measure, and for each block lines that begin
-/// with `block` and end with `end` and a hash. Numbers are written bit by bit. What was cut off or
-/// changed in a file is left out (`damaged`), so its blocks are missing and can be computed again.
+/// As text: for each block lines that begin with `esokit-runs` and what the study is, and end with
+/// `end` and a hash. So texts of parts may be joined by `cat`, in any order. Numbers are written
+/// bit by bit. What was cut off or changed in a file is left out (`damaged`), so its blocks are
+/// missing and can be computed again.
 class StudyRecords {
  public:
   /// No records yet. @param identity that of the study
@@ -181,9 +194,11 @@ class StudyRecords {
 
   /// Adds the records of another part of the same study; an error changes nothing.
   Check<double> add(const StudyRecords& other) {
-    if (const auto ok = identity_.validate(other.identity_); !ok) return ok.error();
+    const bool nothing = other.identity_.runs == 0;  // of a text without a whole record
+    const auto ok = nothing ? Check<double>() : identity_.validate(other.identity_);
+    if (!ok) return ok.error();
     for (const auto& [block, record] : other.blocks_) {
-      if (const auto ok = validate(record); !ok) return ok.error();
+      if (const auto fits = validate(record); !fits) return fits.error();
     }
     for (const auto& [block, record] : other.blocks_) blocks_.emplace(block, record);
     damaged_ += other.damaged_;
@@ -204,23 +219,18 @@ class StudyRecords {
   /// The same of the whole study.
   [[nodiscard]] std::vector<std::int64_t> missing() const { return missing(Part{}).value(); }
 
-  /// The first lines of a text of records.
-  void write_head(std::ostream& out) const {
-    out << "esokit-runs 1 " << hex(identity_.study) << ' ' << hex(identity_.machine) << ' '
-        << identity_.runs << ' ' << identity_.names.size() << '\n';
-    for (std::size_t k = 0; k < identity_.names.size(); ++k) {
-      out << "measure " << hex(identity_.limits[k]) << ' ' << in_a_line(identity_.names[k]) << '\n';
-    }
-  }
   /// The lines of a record.
-  static void write(std::ostream& out, const BlockRecord& record) {
+  void write(std::ostream& out, const BlockRecord& record) const {
     std::ostringstream text;
-    text << "block " << record.block << ' ' << record.failed.size();
+    text << first_words << format << ' ' << identity_.study << ' ' << identity_.machine << ' '
+         << identity_.runs << ' ' << identity_.seed << "\nblock " << record.block << ' '
+         << record.numbers.size() << ' ' << record.failed.size();
     for (const std::int64_t run : record.failed) text << ' ' << run;
     text << '\n';
     for (const RunStatistics& number : record.numbers) {
       const RunSums& s = number.sums();
-      text << "sums " << s.count << ' ' << s.kept;
+      text << "measure " << hex(number.limit()) << ' ' << in_a_line(number.name()) << "\nsums "
+           << s.count << ' ' << s.kept;
       for (const double x : {s.mean, s.squares, s.smallest, s.largest}) text << ' ' << hex(x);
       text << ' ' << s.run_of_smallest << ' ' << s.run_of_largest << "\nbins";
       std::uint64_t last = 0;
@@ -238,70 +248,86 @@ class StudyRecords {
   }
   /// All of it.
   void write(std::ostream& out) const {
-    write_head(out);
     for (const auto& [block, record] : blocks_) write(out, record);
   }
 
-  /// Reads what `write` wrote, perhaps cut off.
-  /// @return the records, or an error if the first lines are not those of such a text, or if a
-  /// block is there twice with other results
+  /// Reads what `write` wrote, also several of it in sequence, perhaps cut off.
+  /// @return the records (none, and no identity, if not one is whole), or an error if the text
+  /// begins otherwise, if its records are of two studies, or if a block is there twice
   static Expected<StudyRecords, Error<double>> read(std::istream& in) {
     StudyRecords all;
-    std::string line;
-    if (!all.read_head(in, line)) {
-      return Error<double>{"records", 0.0, "must begin as esokit wrote them: esokit-runs 1 .."};
-    }
-    std::string lines;
+    if (!in) return Error<double>{"records", 0.0, "cannot be read"};
+    std::string line, lines;
+    StudyIdentity of;
     BlockRecord record;
-    std::size_t at = 0;  // lines of the record
+    std::size_t at = 0, measures = 0;  // lines of the record, and its measures
     const auto skip = [&] {
       if (at > 0) ++all.damaged_;
       at = 0;
     };
-    while (std::getline(in, line)) {
-      if (line.starts_with("block ")) {
+    for (bool first = true; std::getline(in, line); first = false) {
+      if (line.ends_with('\r')) line.pop_back();  // of a file that passed through Windows
+      bool good = true;
+      if (line.starts_with(first_words)) {
         skip();
+        of = {};
         record = {};
         lines.clear();
-        if (!read_block(line, record)) {
-          ++all.damaged_;
-          continue;
+        double version = 0.0;
+        good = read_study(line, of, version);
+        if (good && version != format) {
+          return Error<double>{"records.format",
+                               version,
+                               "is that of another release: compute the parts again, with one of "
+                               "format",
+                               -1,
+                               format,
+                               true};
         }
-        for (std::size_t k = 0; k < all.identity_.names.size(); ++k) {
-          record.numbers.emplace_back(all.identity_.names[k], all.identity_.limits[k]);
-        }
+      } else if (first && !(in.eof() && std::string_view(first_words).starts_with(line))) {
+        return Error<double>{"records", 0.0, "must begin as esokit wrote them: esokit-runs 2 .."};
       } else if (at == 0) {
         continue;  // of a record that was left out
-      } else if (line.starts_with("end ")) {
+      } else if (at == 1) {
+        good = read_block(line, record, measures);
+      } else if (at < 2 + 3 * measures) {
+        good = at % 3 == 2   ? read_measure(line, of, record)
+               : at % 3 == 0 ? read_sums(line, record.numbers.back())
+                             : read_bins(line, record.numbers.back());
+      } else {
         detail::Hash hash;
         hash.add(std::string_view(lines));
-        const bool whole =
-            at == 1 + 2 * record.numbers.size() && line == "end " + hex(hash.value());
-        if (!whole) {
-          skip();
-          continue;
-        }
-        at = 0;
-        if (const auto ok = all.add(std::move(record)); !ok) return ok.error();
-        continue;
-      } else {
-        const std::size_t measure = (at - 1) / 2;
-        if (measure >= record.numbers.size() ||
-            !(at % 2 == 1 ? read_sums(line, record.numbers[measure])
-                          : read_bins(line, record.numbers[measure]))) {
-          skip();
+        good = line == "end " + hex(hash.value());
+        if (good) {
+          at = 0;
+          if (const auto ok = all.take(of, std::move(record)); !ok) return ok.error();
           continue;
         }
       }
+      ++at;
       lines += line;
       lines += '\n';
-      ++at;
+      if (!good) skip();
     }
     skip();
     return all;
   }
 
  private:
+  static constexpr const char* first_words = "esokit-runs ";
+  static constexpr double format = 2;  ///< 1: the study was named once, at the head of a file
+
+  /// Adds a record of a text.
+  Check<double> take(const StudyIdentity& of, BlockRecord&& record) {
+    if (blocks_.empty()) identity_ = of;
+    if (const auto ok = identity_.validate(of); !ok) return ok.error();
+    if (blocks_.contains(record.block) && blocks_.at(record.block) == record) {
+      return Error<double>{"records.block", static_cast<double>(record.block),
+                           "is there twice: join each part once"};
+    }
+    return add(std::move(record));
+  }
+
   /// Whether a record may be added.
   [[nodiscard]] Check<double> validate(const BlockRecord& record) const {
     const auto there = blocks_.find(record.block);
@@ -355,36 +381,34 @@ class StudyRecords {
   }
   /// @}
 
-  bool read_head(std::istream& in, std::string& line) {
-    if (!std::getline(in, line) || in.eof()) return false;  // without its end it is cut off
-    std::string_view rest(line);
-    std::size_t measures = 0;
-    if (next_word(rest) != "esokit-runs" || next_word(rest) != "1" ||
-        !take(rest, identity_.study, 16) || !take(rest, identity_.machine, 16) ||
-        !take(rest, identity_.runs) || !take(rest, measures) || identity_.runs < 1 ||
-        measures > 10'000) {
+  static bool read_study(std::string_view line, StudyIdentity& of, double& version) {
+    int number = 0;
+    next_word(line);
+    if (!take(line, number)) return false;
+    version = number;
+    return version != format || (take(line, of.study) && take(line, of.machine) &&
+                                 take(line, of.runs) && take(line, of.seed) && of.runs >= 1);
+  }
+  static bool read_block(std::string_view line, BlockRecord& record, std::size_t& measures) {
+    std::size_t failed = 0;
+    if (next_word(line) != "block" || !take(line, record.block) || !take(line, measures) ||
+        !take(line, failed)) {
       return false;
     }
-    for (std::size_t k = 0; k < measures; ++k) {
-      double limit = 0.0;
-      if (!std::getline(in, line) || in.eof()) return false;
-      rest = line;
-      if (next_word(rest) != "measure" || !take(rest, limit)) return false;
-      if (!rest.empty()) rest.remove_prefix(1);
-      identity_.names.emplace_back(rest);
-      identity_.limits.push_back(limit);
-    }
-    return true;
-  }
-  static bool read_block(std::string_view line, BlockRecord& record) {
-    std::size_t failed = 0;
-    next_word(line);
-    if (!take(line, record.block) || !take(line, failed)) return false;
     for (std::size_t i = 0; i < failed; ++i) {
       std::int64_t run = 0;
       if (!take(line, run)) return false;
       record.failed.push_back(run);
     }
+    return true;
+  }
+  static bool read_measure(std::string_view line, StudyIdentity& of, BlockRecord& record) {
+    double limit = 0.0;
+    if (next_word(line) != "measure" || !take(line, limit)) return false;
+    if (!line.empty()) line.remove_prefix(1);
+    of.names.emplace_back(line);
+    of.limits.push_back(limit);
+    record.numbers.emplace_back(of.names.back(), limit);
     return true;
   }
   static bool read_sums(std::string_view line, RunStatistics& number) {
