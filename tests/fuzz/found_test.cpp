@@ -269,7 +269,9 @@ TEST(Found, ErrorBoundsAreNumbers) {
             "initial: leaves the range of the scalar in the scaling of the bound");
   const std::string rule =
       "observer_bandwidth: gives with these sources a bound that the scalar cannot hold";
-  EXPECT_EQ(refusal(esokit::linear_error_bound<3>({2e-209, 1}, {0, 1e-3})), rule);
+  EXPECT_EQ(refusal(esokit::linear_error_bound<3>({.observer_bandwidth = 2e-209, .input_gain = 1},
+                                                  {0, 1e-3})),
+            rule);
   EXPECT_EQ(refusal(esokit::linear_error_bound<3>({.observer_bandwidth = 2, .input_gain = 1},
                                                   {5, largest<double>})),
             rule);

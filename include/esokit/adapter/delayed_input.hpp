@@ -45,8 +45,9 @@ requires(detail::goes_into_a_loop<Observer>()) class DelayedInput
  public:
   /// The same with another scalar. Not one that records, as the place in the line changes.
   template <class T>
-  requires(Capacity <= 65535 &&
-           !records<T>) using with_scalar = DelayedInput<detail::WithScalar<Observer, T>, Capacity>;
+  requires(Capacity <= 65535 && !records<T> &&
+           LoopObserver<detail::WithScalar<Observer, T>>) using with_scalar =
+      DelayedInput<detail::WithScalar<Observer, T>, Capacity>;
 
   /// What the adapter can do beyond LoopObserver.
   static constexpr ObserverTraits traits = [] {

@@ -89,8 +89,9 @@ requires(detail::shifts_disturbance<Observer>() &&
 
   /// The same on a scalar that records, see `to_c`: packs of it run one by one.
   template <class T>
-  requires(records<T>&& PlantModel<typename detail::ForScalar<Model, T>::type,
-                                   detail::WithScalar<Observer, T>>) using with_scalar =
+  requires(records<T>&& ShiftableDisturbance<detail::WithScalar<Observer, T>>&&
+               PlantModel<typename detail::ForScalar<Model, T>::type,
+                          detail::WithScalar<Observer, T>>) using with_scalar =
       KnownModel<detail::WithScalar<Observer, T>, typename detail::ForScalar<Model, T>::type>;
 
   /// What the adapter can do beyond LoopObserver.

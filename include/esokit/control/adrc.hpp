@@ -95,9 +95,10 @@ requires(detail::goes_into_a_loop<Observer>()) class Adrc {
 
   using Config = AdrcConfig<Observer>;  ///< settings of make
   using StatusType = StatusOf<S>;       ///< StepStatus, for a pack one per lane
+  /// The same with another scalar.
   template <class T>
-  using with_scalar =
-      Adrc<detail::WithScalar<Observer, T>, Form>;  ///< the same with another scalar
+  requires LoopObserver<detail::WithScalar<Observer, T>>
+  using with_scalar = Adrc<detail::WithScalar<Observer, T>, Form>;
 
   /// Checks the settings and does all the design work.
   /// @return the controller, or an error that names the field

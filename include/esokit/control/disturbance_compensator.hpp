@@ -58,9 +58,10 @@ requires(detail::goes_into_a_loop<Observer>()) class DisturbanceCompensator {
       .observes = true};
 
   using Config = DisturbanceCompensatorConfig<Observer>;  ///< settings of make
+  /// The same with another scalar.
   template <class T>
-  using with_scalar =
-      DisturbanceCompensator<detail::WithScalar<Observer, T>>;  ///< the same with another scalar
+  requires LoopObserver<detail::WithScalar<Observer, T>>
+  using with_scalar = DisturbanceCompensator<detail::WithScalar<Observer, T>>;
 
   /// Checks the settings and does all the design work.
   /// @return the compensator, or an error that names the field

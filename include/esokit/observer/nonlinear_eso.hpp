@@ -61,10 +61,10 @@ requires(detail::is_a_scalar<S>() && detail::is_an_even_gain<Shape, S>()) class 
   static Expected<NonlinearEso, Error<S>> make(const Config& config) {
     return NonlinearEso::NamedObserver::template make<NonlinearEso>(config);
   }
+  /// With another scalar.
   template <class T>
-  using with_scalar =
-      NonlinearEso<Order, T, Extension,
-                   typename detail::ForScalar<Shape, T>::type>;  ///< with another scalar
+  requires EvenGain<typename detail::ForScalar<Shape, T>::type, T>
+  using with_scalar = NonlinearEso<Order, T, Extension, typename detail::ForScalar<Shape, T>::type>;
 
   using Report = NonlinearGainReport<detail::TableScalar<S>>;  ///< see `report`
 

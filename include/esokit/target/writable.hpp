@@ -204,6 +204,7 @@ concept WritableController = WritableObserver<typename ObserverOfController<C>::
 
 /// For recording alone: packs of them run one by one.
 template <class Observer, class T>
+requires PredictableObserver<WithScalar<Observer, T>>
 struct WithScalarOf<PredictiveAdrc<Observer>, T> {
   using type = PredictiveAdrc<WithScalar<Observer, T>>;
 };
