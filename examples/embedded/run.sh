@@ -275,6 +275,7 @@ if [[ $paste == yes ]]; then
   build firmware-host print_pasted
   "$(image firmware-host print_pasted)" >"$out/pasted.hpp"
   cp "$out/pasted.hpp" "$folder/firmware/pasted.hpp"
+  ! command -v clang-format-14 >/dev/null || clang-format-14 -i "$folder/firmware/pasted.hpp"
   echo "written: $folder/firmware/pasted.hpp"
   exit 0
 fi
