@@ -291,12 +291,10 @@ int main(int argc, char** argv) {
        .correct = "(x - w^2 rho)(x^2 + w^2 (3 rho^2 - 8 rho + 3) x + w^4 rho^2)",
        .why = "(9) itself has these factors; two of its roots are negative for rho < 1/3, so that "
               "no common Lyapunov function exists there"});
-  report.correction(
-      {.where = "(7), (11)",
-       .printed = "third entry d'",
-       .correct = "-d'",
-       .why =
-           "the error is the estimate minus the true value, and only the true value contains d'"});
+  report.correction({.where = "(7), (11)",
+                     .printed = "third entry with -d(t, x)",
+                     .correct = "-d'",
+                     .why = "the third state is d, so its error is driven by the derivative of d"});
   Figure figure("stability", {.rows = 2, .columns = 2, .panel_height = 220});
   figure.caption(
       "Top left: smallest rho that is proven stable, and the largest rho for which a periodic "

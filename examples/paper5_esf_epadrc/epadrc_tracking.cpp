@@ -364,12 +364,13 @@ int main(int argc, char** argv) {
                 .here = "Of 9 (r - y, u and f at three noise levels, sine) it is best in " +
                         std::to_string(best) + ": f at sigma 0 and 0.01, u at 0.01.",
                 .figure = "sine"});
-  report.correction({.where = "(11), (23)",
-                     .printed = "the innovation variance transposed",
-                     .correct = "inverted, and with R/(1 + theta)",
-                     .why = "with the transpose P explodes or settles on a wrong gain"});
+  report.correction(
+      {.where = "(10), (32), (53)",
+       .printed = "the innovation variance transposed",
+       .correct = "inverted",
+       .why = "as in (23); with the transpose P explodes or settles on a wrong gain"});
   report.correction({.where = "(24)",
-                     .printed = "K (misprint)",
+                     .printed = "P = -(1 + theta) A P C' s^-1 C P A' as the limit of the gain",
                      .correct = "K = -A P C'/s",
                      .why = "the predictor form subtracts K (y - C z)"});
   report.correction({.where = "(6), (26)",
@@ -387,7 +388,7 @@ int main(int argc, char** argv) {
   report.correction({.where = "(37)-(39), (52), (53)",
                      .printed = "the predictor gain in the current form",
                      .correct = "the current form's gain",
-                     .why = "as printed the loop is unstable at sigma 0 and 0.001 (dotted)"});
+                     .why = "as printed the loop is unstable at sigma 0 and 0.001"});
   int stable = 0;
   for (const double level : levels) {
     const double error = run(Kind::printed, Reference::sine, level, 1).error;

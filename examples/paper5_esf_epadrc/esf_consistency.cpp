@@ -313,12 +313,11 @@ int main(int argc, char** argv) {
   const Square limit = limit_of(0.01, disturbance_change, 2000);
   const Square before = limit_of(0.01, disturbance_change, 1000);
   const double moved = (limit - before).cwiseAbs().cwiseQuotient(limit.cwiseAbs()).maxCoeff();
-  report.claim(
-      {.text = "With constant Q and R, P converges to the solution of a Riccati equation.",
-       .where = "2, property 6, (23)",
-       .holds = moved < 1e-9 ? Claim::Holds::yes : Claim::Holds::no,
-       .here = "With (23) corrected it does; from sample 1000 to 2000 P no longer changes.",
-       .figure = "consistency"});
+  report.claim({.text = "With constant Q and R, P converges to the solution of a Riccati equation.",
+                .where = "2, property 6, (23)",
+                .holds = moved < 1e-9 ? Claim::Holds::yes : Claim::Holds::no,
+                .here = "From sample 1000 to 2000 P no longer changes.",
+                .figure = "consistency"});
   const double less_noise = limit_of(0.005, disturbance_change, 2000)(2, 2) / limit(2, 2);
   const double less_change = limit_of(0.01, 0.5 * disturbance_change, 2000)(2, 2) / limit(2, 2);
   report.claim(
