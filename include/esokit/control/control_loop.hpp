@@ -334,10 +334,7 @@ class ControlLoop {
 
   ControlLoop(const Observer& observer, const Limiter<S>& limiter, const LoopSettings<S>& settings,
               std::uint32_t hold_samples, bool watched) noexcept
-      : observer_(observer),
-        limiter_(limiter),
-        hold_left_(hold_samples),
-        set_{settings.start_hold.input,
+      : set_{settings.start_hold.input,
              settings.missing.input.value_or(S(0)),
              static_cast<std::uint16_t>((settings.missing.most + 1) * settings.measurement_divider),
              static_cast<std::uint16_t>(settings.measurement_divider),
@@ -345,7 +342,10 @@ class ControlLoop {
              settings.missing.input.has_value(),
              settings.missing.stay,
              decltype(Set::limits)(settings.limits)},
-        mode_(hold_samples > 0 ? LoopMode::start_hold : LoopMode::running) {
+        mode_(hold_samples > 0 ? LoopMode::start_hold : LoopMode::running),
+        hold_left_(hold_samples),
+        limiter_(limiter),
+        observer_(observer) {
     set_mode(mode_);
     // The output before the first step is the hold input, or the value nearest to it within the
     // limits.
@@ -451,17 +451,18 @@ class ControlLoop {
     return static_cast<std::uint16_t>(phase_ + 1 == set_.divider ? 0 : phase_ + 1);
   }
 
-  // What a good sample touches comes first: packs of it are read from memory as one block.
-  Observer observer_;
-  Limiter<S> limiter_;
-  S requested_{};
+  // What a good sample touches comes last, beside the weights of a law, and what it writes side by
+  // side: a bank of packs waits for memory. The padding of an object holds what is next.
+  [[no_unique_address]] Set set_;
+  Lanes<LoopMode, S> mode_;
+  Lanes<std::uint16_t, S> phase_{};
+  Lanes<std::uint32_t, S> hold_left_;
+  [[no_unique_address]] Limiter<S> limiter_;
   StatusType status_ = StepStatus::ok;
   /// True if anything besides the law has to be done: one test in the hot path.
   Lanes<bool, S> special_{false};
-  Lanes<std::uint16_t, S> phase_{};
-  Lanes<std::uint32_t, S> hold_left_;
-  [[no_unique_address]] Set set_;  // its padding holds what is next
-  Lanes<LoopMode, S> mode_;
+  S requested_{};
+  Observer observer_;
 };
 
 }  // namespace esokit

@@ -169,13 +169,13 @@ class Limiter {
   static constexpr S smaller(const S& a, const S& b) noexcept { return detail::lower_one(a, b); }
   static constexpr S larger(const S& a, const S& b) noexcept { return detail::upper_one(a, b); }
 
+  S waiting_{};  ///< part of the steps so far that the digits of the output could not hold
   S lower_;
   S upper_;
   S step_;
   S last_{};
   S low_;
   S high_;
-  S waiting_{};  ///< part of the steps so far that the digits of the output could not hold
   Lanes<bool, S> rate_limited_;
   Lanes<bool, S> waits_{};  ///< whether the digits of some u do not hold a step
 };

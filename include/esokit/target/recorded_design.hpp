@@ -472,9 +472,11 @@ template <class Bare, class BareObserver>
   }
   const auto name_of = [](const auto& c, const Number* at) -> std::string {
     // The limiter keeps the bounds of the next output behind the last.
-    constexpr const char* names[] = {"u_last", "u_low", "u_high", "u_waiting"};
-    const auto place = at - &c.output();
-    return 0 <= place && place < 4 ? names[place] : at == &c.requested() ? "u_asked" : "";
+    const Number* behind = &c.output();
+    for (const char* name : {"u_last", "u_low", "u_high"}) {
+      if (at == behind++) return name;
+    }
+    return at == &c.requested() ? "u_asked" : at == &c.limiter().waiting() ? "u_waiting" : "";
   };
   return maker.record(OfController{}, name_of);
 }
