@@ -179,7 +179,10 @@ def of_comments(text):
     """Numbers with a comment behind them: of its line, from the end of the comment before."""
     found, last = [], 0
     for comment in COMMENT.finditer(text):
-        begin = max(last, text.rfind("\n", 0, comment.start()) + 1)
+        line = text.rfind("\n", 0, comment.start()) + 1
+        begin = max(last, line)
+        if text.count("`", line, comment.start()) % 2:
+            continue  # shown as code
         found += numbers_before(text, begin, comment.start(), comment[1])
         last = comment.end()
     return found
@@ -359,6 +362,7 @@ def self_test():
     expect("a changed page", "It is 0.099.", f"It is 0.097 <!--= {a} -->", 2)
     expect("code, names and links", "`x = 5` M4F C++20 [a](b5.md)\n```\n7\n```\n1. first", "", 0)
     expect("the 4 of M4F is a name", f"0.4 on an M4F <!--= {b} -->", None, 0)
+    expect("a comment as code", "`0.4 <!--= none: a -> m -->`", None, 0)
     expect("a thousand", "1,000 runs", "", 1, "1,000 is not in")
     expect("lines of a file", f"{len(Path(__file__).read_text().splitlines())} <!--= lines "
            "examples/common/check_readme.py -->", None, 0)
