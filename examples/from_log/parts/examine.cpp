@@ -271,10 +271,9 @@ void say_residual(const compiled::Residual& residual, Findings& all) {
                         "), as of a y that was filtered, or a machine of higher order.");
   }
   if (rows < 600) {
-    const auto averaged = static_cast<std::size_t>(all.found.averaged);
     all.shown.push_back(
-        "The log is short: " + std::to_string(e.size() * averaged) +
-        (averaged > 1 ? " rows, averaged to " + std::to_string(e.size()) + ", " : " rows, ") +
+        "The log is short: " + std::to_string(all.found.log.rows) + " rows, " +
+        (all.found.averaged > 1 ? "averaged to " + std::to_string(e.size()) + ", " : "") +
         duration_text(rows * T) + ".");
   }
 }
