@@ -10,8 +10,8 @@ usage() {
 usage: examples/embedded/run.sh [--no-install] [--write | --self-test | --paste]
 
   --no-install   do not install missing Debian packages, only name them (status 3)
-  --write        write the tables into README.md instead of comparing them, and the numbers that
-                 other pages take from them
+  --write        write what the code has changed instead of comparing it: firmware/pasted.hpp, the
+                 tables of README.md and the numbers that other pages take from them
   --self-test    instead: see the checks refuse what they are there to refuse
   --paste        instead: write firmware/pasted.hpp, the design that the host makes
   --help         this text
@@ -271,13 +271,13 @@ host_run() {
     "$(image firmware-host drive)" >"$out/host-drive.txt" </dev/null
 }
 
-if [[ $paste == yes ]]; then
+if [[ $paste == yes || $write == yes ]]; then
   build firmware-host print_pasted
   "$(image firmware-host print_pasted)" >"$out/pasted.hpp"
   cp "$out/pasted.hpp" "$folder/firmware/pasted.hpp"
   ! command -v clang-format-14 >/dev/null || clang-format-14 -i "$folder/firmware/pasted.hpp"
   echo "written: $folder/firmware/pasted.hpp"
-  exit 0
+  [[ $write == yes ]] || exit 0
 fi
 
 if [[ $self_test == yes ]]; then
