@@ -20,6 +20,12 @@ for name in "${@:-esokit.hpp}"; do
 done
 
 awk -v headers="${headers[*]}" -v wanted="${*:-esokit.hpp}" -v license="../LICENSE" -v version="$version" '
+  function text(file,    line, all, status) {  # C that a header includes as a literal
+    while ((status = (getline line < file)) > 0) all = all line "\n"
+    if (status < 0) { print "amalgamate.sh: cannot read " file > "/dev/stderr"; exit 1 }
+    close(file)
+    return all
+  }
   function paste(file,    line, name, status, guard) {
     if (file in seen) return
     seen[file] = 1
@@ -29,7 +35,8 @@ awk -v headers="${headers[*]}" -v wanted="${*:-esokit.hpp}" -v license="../LICEN
     while ((status = (getline line < file)) > 0) {
       if (match(line, /^#include <esokit\/[^>]*>/)) {
         name = substr(line, 11, RLENGTH - 11)
-        paste(name)
+        if (name ~ /\.[ch]$/) body[file] = body[file] text(name)
+        else paste(name)
       } else if (line !~ /^#pragma once/) {
         body[file] = body[file] line "\n"
       }

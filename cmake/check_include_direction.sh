@@ -3,7 +3,8 @@
 #   core <- math <- model <- gain <- observer <- adapter <- control <- target <- eigen.hpp <- sim <- analysis <- identify <- tune
 # and every header from core to control, what runs in a controller, that needs Eigen or another header
 # that costs more than a controller; an umbrella header that does not include every other header, and a header that reaches C++20 before
-# core/language.hpp, which says that it is needed.
+# core/language.hpp, which says that it is needed. The C in target/runtime/ includes nothing of esokit, and
+# headers of esokit include it.
 # usage: cmake/check_include_direction.sh [INCLUDE_DIR | --self-test]
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -42,6 +43,8 @@ check() {  # check INCLUDE_DIR
       mine = (part[2] in rank) ? rank[part[2]] : 0
     }
     umbrella && /^#include <esokit\// { brought[$0] = 1 }
+    FNR == 1 { is_c = (FILENAME ~ /^esokit\/target\/runtime\/.*\.[ch]$/) }
+    is_c { if (/^[ \t]*#[ \t]*include.*esokit/) refuse("C that includes esokit"); next }
     /^[ \t]*#[ \t]*include/ {
       target = $0
       sub(/^[ \t]*#[ \t]*include(_next)?[ \t]*/, "", target)
@@ -58,6 +61,7 @@ check() {  # check INCLUDE_DIR
       }
       split(target, part, "/")
       reaches[FILENAME] = 1
+      included[target] = 1
       if (!(target in known)) refuse("no such header")
       else if (umbrella) next
       else if (!(part[2] in rank)) refuse("a header may not include the umbrella header")
@@ -65,6 +69,10 @@ check() {  # check INCLUDE_DIR
     }
     END {
       for (i = 1; i < ARGC; ++i) {
+        if (ARGV[i] ~ /^esokit\/target\/runtime\/.*\.[ch]$/) {
+          if (!(ARGV[i] in included)) { printf "%s: no header includes it\n", ARGV[i]; ++refused }
+          continue
+        }
         if (!(ARGV[i] in reaches) && ARGV[i] !~ /^esokit\/core\/(language|version).hpp$/) {
           printf "%s: does not include esokit/core/language.hpp\n", ARGV[i]
           ++refused
@@ -176,6 +184,20 @@ self_test() {  # the check must be able to fail
   fi
   sed -i '$d' "$folder/esokit/esokit.hpp"
   rm "$folder/esokit/model/bad.hpp"
+  mkdir -p "$folder/esokit/target/runtime"
+  printf '#include DESIGN_HEADER\n#include <math.h>\n' >"$folder/esokit/target/runtime/a.c"
+  if check "$folder" >/dev/null; then
+    echo "self-test: C that no header includes is not refused"
+    return 1
+  fi
+  echo '#include <esokit/target/runtime/a.c>' >>"$folder/esokit/sim/c.hpp"
+  check "$folder" || { echo "self-test: C that a header includes is refused"; return 1; }
+  echo '#include <esokit/core/a.hpp>' >>"$folder/esokit/target/runtime/a.c"
+  if check "$folder" >/dev/null; then
+    echo "self-test: C that includes esokit is not refused"
+    return 1
+  fi
+  sed -i '$d' "$folder/esokit/target/runtime/a.c"
   touch "$folder/esokit/loose.hpp"
   if check "$folder" >/dev/null; then
     echo "self-test: a header outside the folders is not refused"

@@ -36,7 +36,7 @@ dpkg-deb --info "${deb[0]}"
 dpkg-deb -x "${deb[0]}" "$work/root"
 while IFS= read -r header; do
   [[ -f $work/root/usr/$header ]] || fail "the package lacks $header"
-done < <(find include -name '*.hpp')
+done < <(find include -type f)
 [[ -f $work/root/usr/share/doc/libesokit-dev/copyright ]] || fail "the package has no copyright"
 
 cmake -S tests/consumer -B "$work/consumer" -G Ninja -DCONSUMER_MAIN="$work/main.cpp" \

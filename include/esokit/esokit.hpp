@@ -190,13 +190,8 @@
 #include <esokit/sim/study_records.hpp>
 #include <esokit/sim/trapezoid.hpp>
 #include <esokit/sim/window.hpp>
-#include <esokit/target/c_adapter_text.hpp>
-#include <esokit/target/c_angle_text.hpp>
 #include <esokit/target/c_code.hpp>
-#include <esokit/target/c_guard_text.hpp>
-#include <esokit/target/c_law_text.hpp>
-#include <esokit/target/c_text.hpp>
-#include <esokit/target/c_words.hpp>
+#include <esokit/target/c_design.hpp>
 #include <esokit/target/fixed_bounds.hpp>
 #include <esokit/target/fixed_builder.hpp>
 #include <esokit/target/fixed_design.hpp>
@@ -214,8 +209,7 @@
 #include <esokit/target/recorded_numbers.hpp>
 #include <esokit/target/recorder.hpp>
 #include <esokit/target/recording.hpp>
-#include <esokit/target/st_expressions.hpp>
-#include <esokit/target/st_file.hpp>
+#include <esokit/target/runtime_text.hpp>
 #include <esokit/target/st_translator.hpp>
 #include <esokit/target/structured_text.hpp>
 #include <esokit/target/writable.hpp>

@@ -92,7 +92,7 @@ class Array(dict):
 
 def clone(value):
     if isinstance(value, Array):
-        return Array(value)
+        return Array((place, clone(one)) for place, one in value.items())
     if isinstance(value, Values):
         new = Values()
         new.__dict__.update((name, clone(one)) for name, one in value.__dict__.items())

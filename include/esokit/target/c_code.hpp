@@ -6,12 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <esokit/core/expected.hpp>
-#include <esokit/target/c_adapter_text.hpp>
-#include <esokit/target/c_angle_text.hpp>
-#include <esokit/target/c_guard_text.hpp>
-#include <esokit/target/c_law_text.hpp>
-#include <esokit/target/c_text.hpp>
-#include <esokit/target/c_words.hpp>
+#include <esokit/target/c_design.hpp>
 #include <esokit/target/list_writer.hpp>
 #include <esokit/target/recorded_design.hpp>
 #include <esokit/target/writable.hpp>
@@ -31,169 +26,10 @@ struct CCode {
 
 namespace detail {
 
-/// `static bool name(state *o, arguments, *u)`: true, or false if a check does not hold; then
-/// nothing has changed.
-inline std::string c_function(const ListWriter& writer, const std::string& prefix,
-                              const NamedCall& names, const RecordedCall& call) {
-  const WrittenCall lines = writer.written(names, call);
-  std::string text = "static bool " + names.name + "(" + (lines.results.empty() ? "const " : "") +
-                     prefix + "_state *o";
-  for (const auto& argument : names.arguments) text += ", " + writer.real() + " " + argument;
-  if (names.has_output) text += ", " + writer.real() + " *u_out";
-  text += ")\n{\n";
-  for (const auto* part : {&lines.reads, &lines.lines}) {
-    for (const auto& line : *part) {
-      text += std::string("  const ") + (line.is_condition ? "bool" : writer.real()) + " " +
-              line.name + " = " + line.expression + ";\n";
-    }
-  }
-  for (const auto& argument : lines.unused) text += "  (void)" + argument + ";\n";
-  for (const auto& check : lines.checks)
-    text += "  if (!" + check + ") {\n    return false;\n  }\n";
-  for (const auto& [member, value] : lines.results) {
-    text += "  o->" + member + " = " + value + ";\n";
-  }
-  if (lines.results.empty() && lines.reads.empty()) text += "  (void)o;\n";
-  if (names.has_output) text += "  *u_out = " + lines.output + ";\n";
-  return text + "  return true;\n}\n\n";
-}
-
-/// The two files of a design.
+/// The texts of a design. @param mark of its text, if settings can be changed
 inline CCode c_texts(const RecordedDesign& design, const std::string& mark) {
-  ListWriter writer(c_language, design.single);
-  writer.members = design.members;
-  writer.live = design.live;
-  writer.settings = design.settings;
-  std::string lists;
-  for (std::size_t i = 0; i < design.names.size(); ++i) {
-    const std::string& name = design.names[i].name;
-    if ((design.gate.threshold > 0 || design.law.watches || design.predictive ||
-         design.measured.on) &&
-        name == "observe") {
-      continue;
-    }
-    if (name == "filter_to_limit" && !design.law.returns) continue;
-    lists += c_function(writer, design.options.name, design.names[i], design.calls[i]);
-  }
-  const bool controls = design.is_controller;
-  Words words = controls            ? c_loop_words(design, writer)
-                : design.predictive ? c_phase_words(design)
-                                    : c_observer_words(design);
-  // Layer by layer: each calls the one below.
-  std::string layers;
-  std::string predict = "base";
-  std::string correct = "base";
-  std::string update = "base";
-  std::string rest = "rest_at";
-  std::string restart = "restart";
-  const auto add = [&](const char* text) {
-    layers += filled(text, {{"predict_$below", "predict_" + predict},
-                            {"correct_$below", "correct_" + correct},
-                            {"update_$below", "update_" + update}});
-  };
-  const bool gated = design.gate.threshold > 0;
-  const bool runs = design.law.kind != RunningLaw::none;
-  const bool wraps = design.wrap.period > 0;
-  if (runs) {
-    add(c_source_running);
-    predict = "running";
-  }
-  const bool measures = design.measured.on;
-  if (measures) {
-    const bool updates = !gated && !design.law.watches;
-    add(filled(c_measured(design, writer, controls),
-               {{"$W_UPDATE", updates ? c_source_measured_update : ""}})
-            .c_str());
-    predict = "measured";
-  }
-  if (design.law.watches) {
-    add(c_source_watched);
-    if (!design.predictive) add(c_source_watched_update);
-    correct = update = "watched";
-  }
-  if (gated) {
-    add(c_source_gate);
-    correct = update = "gated";
-  } else if (measures && !design.law.watches) {
-    update = "measured";
-  } else if (!design.law.watches && !design.predictive) {
-    add(c_source_base_update);
-    if (runs) {
-      add(c_source_running_update);
-      update = "running";
-    }
-  }
-  if (wraps) {
-    add(c_source_wrapped);
-    layers += design.wrap.gated ? c_source_wrapped_gated : c_source_wrapped_keep;
-    add(c_source_wrapped_layer);
-    predict = correct = update = "wrapped";
-    restart = "restart_wrapped";
-  }
-  if ((controls || design.predictive) && (wraps || runs)) {
-    layers += wraps ? c_source_wrapped_rest : c_source_running_rest;
-    rest = wraps ? "rest_wrapped" : "rest_running";
-  }
-  if (design.known.on) {
-    add(c_source_known);
-    predict = update = "known";
-  }
-  if (!design.line.empty()) {
-    add(c_source_delay);
-    if (controls) layers += c_source_delay_fill;
-    predict = update = "delayed";
-  }
-  if (design.guard.on) {  // the outermost
-    add(c_source_guarded);
-    if (!design.softens) add(c_source_guarded_gain);
-    if (!controls) add(c_source_guarded_hold);
-    predict = correct = update = "guarded";
-    layers += filled(controls ? c_source_guarded_rest : c_source_guarded_restart,
-                     {{"$below_restart", restart}, {"$below_rest", rest}});
-    rest = "rest_guarded";
-    restart = "restart_guarded";
-  }
-  words.insert(words.end(), {{"predict_$top", "predict_" + predict},
-                             {"correct_$top", "correct_" + correct},
-                             {"update_$top", "update_" + update},
-                             {"$restart", restart},
-                             {"$rest", rest}});
-  const Words common = c_words(design, writer);
-  words.insert(words.end(), common.begin(), common.end());
-  const auto text = [&](const std::string& from) { return filled(from, words); };
-  const char* law_text = design.law.kind == RunningLaw::schedule ? c_source_schedule
-                         : runs                                  ? c_source_filter
-                                                                 : "";
-  const bool opens = design.options.settings_in_struct;
-  std::string set;
-  if (opens) {
-    set = "const $name_settings $name_$SET = {\n  $DESIGN";
-    for (std::size_t i = 0; i < design.members.size(); ++i) {
-      if (design.live[i] && design.settings[i]) set += ",\n  " + writer.number(design.numbers[i]);
-    }
-    set += ",\n  {\n";
-    for (const auto& row : design.gap_gains) {
-      std::string line;
-      for (const double k : row) line += (line.empty() ? "    {" : ", ") + writer.number(k);
-      set += line + "},\n";
-    }
-    set += "  }\n};\n\n";
-    words.insert(words.begin(), {"$DESIGN", mark});
-  }
-  set = text(set);
-  return {text(c_header_head) + (opens ? text(c_header_settings) : "") +
-              text(controls            ? c_header_controller
-                   : design.predictive ? c_header_predictive
-                                       : c_header_observer) +
-              text(c_header_tail),
-          text(c_source_head) + c_source_recorded + set + lists + text(law_text) +
-              text("$TABLE_OF_FILE") + text(c_source_observer_part) + text(layers) +
-              text(controls            ? c_source_controller
-                   : design.predictive ? c_source_predictive
-                                       : c_source_observer) +
-              (controls && design.guard.on ? text(c_source_guarded_hold_sample) : "") +
-              (opens ? text(c_source_adopt) : "") + text(c_source_self_test),
-          opens ? "#include \"" + design.options.name + ".h\"\n\n" + set : ""};
+  CDesign text(design, mark);
+  return {text.header(), text.source(), text.settings_file()};
 }
 
 /// The texts; settings bear a mark of what else is in them.

@@ -290,7 +290,7 @@ class DesignRecorder {
     }
     if constexpr (runs == RunningLaw::filter) {
       if (design.law.watches) {
-        add("fits", "y", false, [](auto& c, const Numbers& in) {
+        add("is_inlier", "y", false, [](auto& c, const Numbers& in) {
           RecordAccess::judge(of(c), in[0]);
           return Numbers{};
         });
@@ -451,7 +451,7 @@ template <class Bare, class BareObserver>
                     return Numbers{};
                   });
   if constexpr (Access::blanks<BareObserver>) {
-    maker.add("law", "r " + numbered("e", BareObserver::size, 0), true,
+    maker.add("law_for", "r " + numbered("e", BareObserver::size, 0), true,
               [](auto& c, const Numbers& in) { return Numbers{Access::law_for(c, in)}; });
   } else {
     maker.add("law", "r", true,
@@ -460,7 +460,7 @@ template <class Bare, class BareObserver>
   maker.add("limit", "u", true, [](auto& c, const Numbers& in) {
     return Numbers{Access::limited(Access::loop(c), in[0])};
   });
-  maker.add("applied", "u", false, [](auto& c, const Numbers& in) {
+  maker.add("take_applied", "u", false, [](auto& c, const Numbers& in) {
     Access::loop(c).applied(in[0]);
     return Numbers{};
   });

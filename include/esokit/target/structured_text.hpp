@@ -110,7 +110,11 @@ class StBlock {
   /// @param begins the function that gives the state its first values
   StBlock(const CCode& code, const CodeOptions& options, bool single, const std::string& begins)
       : translator(code.header + code.source, options.name), words_{{"$name", options.name}} {
-    translator.initial_from(options.name + begins);
+    if (translator.has(options.name + begins)) {
+      own("begun : BOOL");
+      first_ =
+          "IF NOT begun THEN\n  done := $name" + begins + "(o := o);\n  begun := TRUE;\nEND_IF;\n";
+    }
     const std::string& comment = options.comment;
     words_.emplace_back("$real", single ? "REAL" : "LREAL");
     words_.emplace_back("$COMMENT", comment.empty() ? "" : "   " + comment + "\n");
@@ -132,7 +136,7 @@ class StBlock {
     const std::string block =
         filled("FUNCTION_BLOCK $name\nVAR_INPUT\n" + inputs_ + "END_VAR\nVAR_OUTPUT\n" + outputs_ +
                    "END_VAR\nVAR\n  o : $name_state;\n" + own_ + "  done : BOOL;\nEND_VAR\n\n" +
-                   body + "END_FUNCTION_BLOCK\n",
+                   first_ + body + "END_FUNCTION_BLOCK\n",
                words_);
     translator.write_for(block);
     const std::string& name = words_[0].second;
@@ -146,6 +150,7 @@ class StBlock {
     return "  " + declared + ";" + (comment.empty() ? "" : " (* " + comment + " *)") + "\n";
   }
   Words words_;
+  std::string first_{};
   std::string inputs_{};
   std::string outputs_{};
   std::string own_{};

@@ -1,0 +1,340 @@
+#ifdef __cplusplus
+R"esokit("
+#endif
+#if ESOKIT_GUARDED
+#define observe_update update_guarded
+#define observe_predict predict_guarded
+#define observe_correct correct_guarded
+#define observe_rest rest_guarded
+#define observe_restart restart_guarded
+#else
+#define observe_update update_outside
+#define observe_predict predict_outside
+#define observe_correct correct_outside
+#define observe_rest rest_outside
+#if ESOKIT_WRAPPED
+#define observe_restart restart
+#else
+#define observe_restart restart_plain
+#endif
+#endif
+#if ESOKIT_CONTROLLER
+static void judge_missing(esokit_state *o)
+{
+  if (o->gap >= MISSING_LIMIT) {
+    o->mode = ESOKIT_SAFE;
+  }
+#if !ESOKIT_STAYS_SAFE
+  if ((o->mode == ESOKIT_SAFE) && (o->gap < DIVIDER)) {
+    o->mode = ESOKIT_RUNNING;
+  }
+#endif
+}
+
+/* u of the law. */
+static real wanted(esokit_state *o, real r)
+{
+  real u = 0.0;
+#if ESOKIT_LAW_OF_ANGLE
+  (void)law(o, wrapped(r - o->DESIGN_ANGLE), &u);
+#elif ESOKIT_WRAPPED && !ESOKIT_ERROR_BASED && !ESOKIT_COMPENSATOR
+  const real angle = estimate_at(o, 0u);
+  (void)law(o, angle + wrapped(r - angle), &u);
+#elif ESOKIT_GUARDED && ESOKIT_COMPENSATOR
+  (void)law(o, -0.0, &u);
+  u = r + (u * o->input_factor);
+#else
+  (void)law(o, r, &u);
+#endif
+#if ESOKIT_GUARDED && !ESOKIT_SOFTENS && !ESOKIT_COMPENSATOR
+  u = u * o->input_factor;
+#endif
+  return u;
+}
+
+static real put_out(esokit_state *o, real r)
+{
+  real u;
+  if (o->mode == ESOKIT_RUNNING) {
+    u = wanted(o, r);
+  } else if (o->mode == ESOKIT_SAFE) {
+#if ESOKIT_SAFE_INPUT
+    u = SAFE_INPUT;
+#else
+    u = o->u_last;
+#endif
+  } else {
+    o->hold_left = o->hold_left - 1u;
+    if (o->hold_left == 0u) {
+      o->mode = ESOKIT_RUNNING;
+    }
+    u = HOLD_INPUT;
+  }
+  (void)limit(o, u, &u);
+  return u;
+}
+
+void esokit_init(esokit_state *o)
+{
+  DESIGN_INIT
+#if ESOKIT_DIVIDED
+  o->phase = 0u;
+#endif
+  o->hold_left = HOLD_SAMPLES;
+  o->gap = 0u;
+  o->mode = FIRST_MODE;
+  o->status = 0u;
+}
+
+unsigned esokit_start(esokit_state *o, real y, real u)
+{
+  esokit_state before;
+#if ESOKIT_ERROR_BASED
+  const real at = 0.0;
+#else
+  const real at = y;
+#endif
+#if ESOKIT_COMPENSATOR
+  if (!is_finite(u)) {
+    return ESOKIT_INPUT_REJECTED;
+  }
+#endif
+  if (!is_finite(y)) {
+    return ESOKIT_STATE_REJECTED;
+  }
+#if !ESOKIT_COMPENSATOR
+  if (!is_finite(u)) {
+    return ESOKIT_INPUT_REJECTED;
+  }
+#endif
+  before = *o;
+#if ESOKIT_DELAYED && ESOKIT_GUARDED
+  fill_delayed(o, u * o->gain_ratio);
+#elif ESOKIT_DELAYED
+  fill_delayed(o, u);
+#endif
+  (void)observe_predict(o, u); /* keeps it as applied */
+#if ESOKIT_MEASURED
+  settle_measured(o);
+#endif
+  if (!observe_rest(o, at, u)) {
+    *o = before;
+    return ESOKIT_STATE_REJECTED;
+  }
+  (void)take_applied(o, u);
+#if ESOKIT_SOFTENS
+  (void)harden(o);
+#endif
+#if ESOKIT_GATED
+  gate_set(o, true);
+#endif
+  o->gap = 0u;
+  o->mode = ESOKIT_RUNNING;
+  return 0u;
+}
+
+/* The observer's part of a sample. */
+static void take_sample(esokit_state *o, real measured, real given)
+{
+#if ESOKIT_DIVIDED
+  const bool planned = (o->gap + 1u) == DIVIDER;
+#endif
+  unsigned status = observe_update(o, measured, given);
+  if ((status & ESOKIT_RESTARTED) != 0u) {
+#if ESOKIT_GUARDED
+    const real held = applied_by_present(o);
+#elif ESOKIT_KNOWN
+    const real held = o->u_given;
+#else
+    const real held = o->u_applied;
+#endif
+    const bool rests = observe_rest(o, measured, held);
+#if ESOKIT_GATED
+    if (rests) {
+      gate_set(o, true);
+    }
+#else
+    (void)rests;
+#endif
+  }
+#if ESOKIT_DIVIDED
+  if (planned && (status == ESOKIT_GAP_BRIDGED)) {
+    status = 0u;
+  }
+#endif
+  o->status = (uint8_t)status;
+  judge_missing(o);
+}
+
+static void skip_sample(esokit_state *o, real given)
+{
+#if ESOKIT_DIVIDED
+  o->phase = (uint16_t)(o->phase + 1u);
+  if (o->phase >= DIVIDER) {
+    o->phase = 0u;
+  }
+#endif
+  o->status = (uint8_t)observe_predict(o, given);
+  judge_missing(o);
+}
+
+real esokit_update(esokit_state *o, real y, real r)
+{
+#if ESOKIT_ERROR_BASED
+  const real measured = r - y;
+#else
+  const real measured = y;
+#endif
+#if ESOKIT_DIVIDED
+  if (o->phase != 0u) {
+    skip_sample(o, o->u_last);
+    return put_out(o, r);
+  }
+  o->phase = 1u;
+#endif
+  take_sample(o, measured, o->u_last);
+  return put_out(o, r);
+}
+
+real esokit_update_without_measurement(esokit_state *o, real r)
+{
+  skip_sample(o, o->u_last);
+  return put_out(o, r);
+}
+
+void esokit_applied(esokit_state *o, real u)
+{
+  (void)take_applied(o, u);
+}
+
+#if ESOKIT_GUARDED
+static real hold_sample(esokit_state *o, real measured, real u)
+{
+  real given;
+#if ESOKIT_SOFTENS
+  (void)harden(o);
+#endif
+  (void)take_applied(o, u);
+  if (o->mode == ESOKIT_START_HOLD) {
+    o->mode = ESOKIT_RUNNING;
+  }
+  given = hold_guards(o);
+#if ESOKIT_DIVIDED
+  if (o->phase != 0u) {
+    skip_sample(o, given);
+    release_guards(o);
+    return o->u_last;
+  }
+  o->phase = 1u;
+#endif
+  take_sample(o, measured, given);
+  release_guards(o);
+#if ESOKIT_MONITORED
+  o->u_asked = o->u_last;
+#endif
+  return o->u_last;
+}
+
+#if ESOKIT_ERROR_BASED
+real esokit_hold(esokit_state *o, real y, real r, real u)
+{
+  return hold_sample(o, r - y, u);
+}
+#else
+real esokit_hold(esokit_state *o, real y, real u)
+{
+  return hold_sample(o, y, u);
+}
+#endif
+
+#endif
+#if ESOKIT_SETTINGS
+bool esokit_adopt(esokit_state *o, const esokit_settings *settings)
+{
+  const bool is_ours = settings->design == DESIGN_MARK;
+  if (is_ours) {
+    o->settings = settings;
+    (void)take_applied(o, o->u_last);
+  }
+  return is_ours;
+}
+
+#endif
+#elif !ESOKIT_PREDICTIVE
+void esokit_init(esokit_state *o)
+{
+  DESIGN_INIT
+  o->gap = 0u;
+}
+
+unsigned esokit_reset(esokit_state *o, real y)
+{
+  unsigned status = ESOKIT_STATE_REJECTED;
+  if (observe_restart(o, y)) {
+#if ESOKIT_GATED
+    gate_set(o, true);
+#endif
+    status = 0u;
+  }
+  return status;
+}
+
+unsigned esokit_predict(esokit_state *o, real u)
+{
+  return observe_predict(o, u);
+}
+
+unsigned esokit_correct(esokit_state *o, real y)
+{
+  return observe_correct(o, y);
+}
+
+unsigned esokit_update(esokit_state *o, real y, real u)
+{
+  return observe_update(o, y, u);
+}
+
+#if ESOKIT_SETTINGS
+bool esokit_adopt(esokit_state *o, const esokit_settings *settings)
+{
+  const bool is_ours = settings->design == DESIGN_MARK;
+  if (is_ours) {
+    o->settings = settings;
+  }
+  return is_ours;
+}
+
+#endif
+#endif
+real esokit_estimate(const esokit_state *o, unsigned row)
+{
+  return estimate_at(o, row);
+}
+
+#ifdef ESOKIT_SELF_TEST
+int esokit_self_test(real tolerance)
+{
+  static const real samples[SAMPLES][3] = { /* DESIGN_COLUMNS */
+    DESIGN_VECTORS
+  };
+  esokit_state o;
+  int i;
+  esokit_init(&o);
+  for (i = 0; i < SAMPLES; ++i) {
+#if ESOKIT_CONTROLLER || ESOKIT_PREDICTIVE
+    const real result = esokit_update(&o, samples[i][0], samples[i][1]);
+#else
+    real result;
+    (void)esokit_update(&o, samples[i][0], samples[i][1]);
+    result = esokit_estimate(&o, ORDER);
+#endif
+    if (!(fabs(result - samples[i][2]) <= tolerance)) {
+      return i + 1;
+    }
+  }
+  return 0;
+}
+#endif
+#ifdef __cplusplus
+")esokit"
+#endif

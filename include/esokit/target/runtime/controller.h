@@ -1,0 +1,251 @@
+#ifdef __cplusplus
+R"esokit("
+#endif
+#ifndef ESOKIT_H
+#define ESOKIT_H
+/* Written by esokit from a finished design; do not edit.
+DESIGN_ABOUT
+ *
+ * Compile with -std=c99 or -ffp-contract=off: then it equals the C++ DESIGN_EXACTLY. */
+
+#if ESOKIT_SETTINGS || ESOKIT_GUARDED
+#include <stdbool.h>
+#endif
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define ESOKIT_SAMPLE_TIME SAMPLE_TIME /* s */
+
+/* Flags of `status`; 0: all is well. */
+#define ESOKIT_MEASUREMENT_REJECTED 1u /* y was NaN, infinite or too large */
+#define ESOKIT_INPUT_REJECTED 2u /* u was too large: the last good one was used */
+#define ESOKIT_PREDICTION_DROPPED 4u /* the next good y restarts */
+#define ESOKIT_GAP_BRIDGED 8u /* samples were missing before this one */
+#define ESOKIT_RESTARTED 16u /* too many samples were missing */
+#define ESOKIT_STATE_REJECTED 32u /* start: y is not finite or too large */
+#if ESOKIT_GATED || ESOKIT_WATCHED
+#define ESOKIT_OUTLIER_REJECTED 64u /* y was too far from what was expected */
+#endif
+#if ESOKIT_WRAPPED
+#define ESOKIT_TURN_ASSUMED 128u /* y moved otherwise than before: its turn is uncertain */
+#endif
+
+#if ESOKIT_SETTINGS
+/* What may be changed while it runs, by esokit_adopt. (MISRA C:2012 8.7, advisory: those of other
+ * designs are in other files.) */
+typedef struct {
+  uint32_t design; /* of which text: others are refused */
+  DESIGN_SETTINGS
+  real gains[ROWS][GAINS]; /* of the observer, after 1, 2, .. samples */
+} esokit_settings;
+
+extern const esokit_settings esokit_DESIGN_SET;
+
+#endif
+#if ESOKIT_CONTROLLER
+/* `mode`: what determines u. */
+#define ESOKIT_RUNNING 0u
+#define ESOKIT_START_HOLD 1u
+#define ESOKIT_SAFE 2u /* too many measurements are missing */
+
+#endif
+#if ESOKIT_WRAPPED
+/* The count of the turns of an angle. */
+typedef struct {
+  real angle; /* the last y, within half a period of zero */
+  real turns;
+  real motion; /* of y in motion_samples */
+  uint16_t motion_samples;
+  uint8_t gaps;
+  uint8_t doubts;
+  uint8_t begun;
+} esokit_turns;
+
+#endif
+#if ESOKIT_MEASURED
+/* A measured disturbance w. */
+typedef struct {
+  real memory[W_LENGTH]; /* a ring */
+  real given; /* by esokit_measured */
+  real last; /* the last good one */
+  real lagged; /* behind dead time and lag */
+  uint32_t lost;
+  uint16_t newest;
+} esokit_w;
+
+#endif
+typedef struct {
+#if ESOKIT_SETTINGS
+  const esokit_settings *settings;
+#endif
+  DESIGN_MEMBERS
+#if ESOKIT_DELAYED
+  real line[LENGTH]; /* u, not yet acting */
+  uint16_t newest;
+#endif
+#if ESOKIT_GATED
+  real gate_mean; /* of the innovation without its sign */
+  uint16_t gate_count;
+  uint8_t gate_open;
+#endif
+#if ESOKIT_WRAPPED
+  esokit_turns taken;
+#endif
+#if ESOKIT_GATED_ANGLE
+  esokit_turns heard; /* those that are rejected, too */
+  uint16_t heard_at; /* samples since one was taken, at the last one */
+  uint8_t heard_steady;
+  uint8_t heard_rejected;
+#endif
+#if ESOKIT_MEASURED
+  esokit_w w[W_COUNT];
+  real w_told; /* their part of the disturbance */
+  uint8_t w_is_new;
+#endif
+#if ESOKIT_GUARDED
+  real trust; /* see esokit_set_trust */
+  real weight_up;
+  real weight_down;
+  real gain_ratio;
+  real told_ratio;
+  real input_factor;
+  uint32_t settling_left;
+  uint16_t release_left;
+  uint8_t pin;
+  uint8_t side;
+  uint8_t held;
+  uint8_t unsettled;
+  uint8_t frozen;
+  uint8_t gated;
+#endif
+#if ESOKIT_SCHEDULE
+  uint32_t age; /* samples of the schedule */
+  uint8_t pending;
+  uint8_t settled;
+#endif
+#if ESOKIT_FILTER
+  uint8_t since; /* the last step of the gain */
+#endif
+#if ESOKIT_DIVIDED
+  uint16_t phase; /* a measurement is due at 0 */
+#endif
+#if ESOKIT_PREDICTIVE
+  real measurement;
+#endif
+#if ESOKIT_CONTROLLER || ESOKIT_PREDICTIVE
+  uint32_t hold_left; /* samples of the start hold */
+#endif
+  uint16_t gap; /* samples since the last measurement that was taken */
+#if ESOKIT_PREDICTIVE
+  uint8_t phase; /* 1: y was told, 2: it is missing */
+  uint8_t status;
+#endif
+#if ESOKIT_CONTROLLER
+  uint8_t mode;
+  uint8_t status;
+#endif
+} esokit_state;
+
+/* At rest at y = 0, u = 0. Call it before all else. */
+void esokit_init(esokit_state *o);
+#if ESOKIT_CONTROLLER
+/* Takes over a plant at rest at y under u; begin with the reference at y. Returns a status. */
+unsigned esokit_start(esokit_state *o, real y, real u);
+/* One sample: y (NaN if it is missing) and r, DESIGN_REFERENCE; returns the u to be held
+ * until the next. */
+real esokit_update(esokit_state *o, real y, real r);
+/* The same without a measurement. */
+real esokit_update_without_measurement(esokit_state *o, real r);
+/* What the actuator really held, before the next update; only if it differs from what update gave. */
+void esokit_applied(esokit_state *o, real u);
+#elif ESOKIT_PREDICTIVE
+/* Takes over a plant at rest at y under u; the reference is y. Returns a status. */
+unsigned esokit_start(esokit_state *o, real y, real u);
+/* Restarts at (y, 0, .., 0), and the start hold. Returns a status. */
+unsigned esokit_reset(esokit_state *o, real y);
+/* At the sample: y (NaN if it is missing); returns the u to be held until the next. */
+real esokit_control(esokit_state *o, real y);
+/* The same without a measurement. */
+real esokit_control_without_measurement(esokit_state *o);
+/* The rest, any time before the next sample, whose reference is given. Returns a status. */
+unsigned esokit_prepare(esokit_state *o, real next_r);
+/* Both at once. */
+real esokit_update(esokit_state *o, real y, real next_r);
+/* What the actuator really holds; only if it is not what control gave. Returns a status. */
+unsigned esokit_applied(esokit_state *o, real u);
+#else
+/* Restarts at (y, 0, .., 0). Returns a status. */
+unsigned esokit_reset(esokit_state *o, real y);
+/* One sample: y, and the u that the actuator held since the last one. Returns a status. */
+unsigned esokit_update(esokit_state *o, real y, real u);
+/* Its halves; `predict` alone is a sample without a measurement. */
+unsigned esokit_predict(esokit_state *o, real u);
+unsigned esokit_correct(esokit_state *o, real y);
+#endif
+/* Estimate number 0 .. DESIGN_LAST: y, y', .., and then the disturbance, in physical units. */
+real esokit_estimate(const esokit_state *o, unsigned row);
+
+#if ESOKIT_MEASURED
+/* w, measured, before the sample at which it begins to act; without it, or if it is not finite,
+ * the last good one counts for W_MOST_LOST samples, then zero. */
+#if ESOKIT_ONE_W
+void esokit_measured(esokit_state *o, real w);
+#else
+void esokit_measured(esokit_state *o, const real w[W_COUNT]);
+#endif
+
+#endif
+#if ESOKIT_GUARDED
+/* From the next correction on, those of the disturbance count so much, 0 .. 1. */
+void esokit_set_trust(esokit_state *o, real trust);
+
+/* At which limit an actuator of unknown output is. */
+#define ESOKIT_PIN_FREE 0u
+#define ESOKIT_PIN_UPPER 1u
+#define ESOKIT_PIN_LOWER 2u
+#define ESOKIT_PIN_EITHER 3u /* by the sign of u */
+void esokit_set_pin(esokit_state *o, uint8_t where);
+
+#if ESOKIT_CONTROLLER
+/* Instead of update, for a plant that something else holds under u: y is followed, the
+ * disturbance stays; returns u. On release begin with the reference at y. */
+#if ESOKIT_ERROR_BASED
+real esokit_hold(esokit_state *o, real y, real r, real u);
+#else
+real esokit_hold(esokit_state *o, real y, real u);
+#endif
+#else
+/* Something else holds the plant, until `release`; returns the u to give to the observer. */
+real esokit_hold(esokit_state *o);
+void esokit_release(esokit_state *o);
+#endif
+
+#if !ESOKIT_SOFTENS
+/* Another b0 from the next sample on; false, and nothing changes, if it has another sign
+ * or is too far away. */
+bool esokit_set_input_gain(esokit_state *o, real b);
+
+#endif
+#endif
+#if ESOKIT_SETTINGS
+/* Other settings, of a design with the same sample time, b0 and structure, from now on; estimates
+ * and output are kept. False, and nothing changes, if they are of another text. */
+bool esokit_adopt(esokit_state *o, const esokit_settings *settings);
+
+#endif
+#ifdef ESOKIT_SELF_TEST
+/* 0, or the number of the first sample whose result differs from that of the design by more than
+ * `tolerance`; 0 asks for equal numbers. */
+int esokit_self_test(real tolerance);
+#endif
+
+#ifdef __cplusplus
+}
+#endif
+#endif
+#ifdef __cplusplus
+")esokit"
+#endif

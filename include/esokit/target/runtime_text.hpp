@@ -1,0 +1,199 @@
+/// @file
+/// The C around what is recorded: the files in target/runtime/, without the parts that a design
+/// does not have, and with its names and numbers.
+#pragma once
+
+#include <cctype>
+#include <cstddef>
+#include <esokit/core/language.hpp>
+#include <initializer_list>
+#include <map>
+#include <set>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace esokit::detail {
+
+/// Files of target/runtime/, each one C99 and, for a C++ compiler, the literal that holds it.
+namespace runtime {
+inline constexpr const char* head =
+#include <esokit/target/runtime/head.c>
+    ;
+}  // namespace runtime
+
+/// Makes the text of a written C from files of target/runtime/. In these
+/// - an `#if` over words that begin with ESOKIT_ (with !, && and ||) asks for a feature; it and
+///   what is not chosen do not come into the text,
+/// - `esokit_` and `ESOKIT_` begin names: they become that of the design,
+/// - a word such as DESIGN_Y stands for a text; alone in its line, for lines,
+/// - a word such as GATE_MOST is a constant: a header has its value, a source a `#define`,
+/// - a `#define` of a small letter is another name for a function, not a part of the text,
+/// - `real`, 0.5 and fabs become float, 0.5f and fabsf in single precision.
+class RuntimeText {
+ public:
+  RuntimeText(const std::string& name, bool single) : single_(single), name_(name) {
+    for (const char c : name) {
+      upper_ += static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+    }
+    word("real", single ? "float" : "double");
+    word("DESIGN_HEADER", "\"" + name + ".h\"");
+    feature("ESOKIT_SINGLE", single);
+    for (const char* one : {"fabs", "round", "sqrt", "ceil", "cbrt"}) {
+      if (single) word(one, std::string(one) + "f");
+    }
+  }
+
+  void feature(const std::string& name, bool on) {
+    if (on) features_.insert(name);
+  }
+  void word(const std::string& name, const std::string& text) { words_[name] = text; }
+  /// @param text each line with its end
+  void lines(const std::string& name, const std::string& text) { lines_[name] = text; }
+  void constant(const std::string& name, const std::string& value) {
+    constants_.emplace_back(name, value[0] == '-' ? "(" + value + ")" : value);
+  }
+  void count(const std::string& name, std::size_t value) {
+    constant(name, std::to_string(value) + "u");
+  }
+
+  /// Whether a condition of an `#if` holds: names with !, joined by &&, these by ||.
+  [[nodiscard]] bool has(std::string_view condition) const {
+    const std::size_t either = condition.find(" || ");
+    if (either != std::string_view::npos) {
+      return has(condition.substr(0, either)) || has(condition.substr(either + 4));
+    }
+    const std::size_t both = condition.find(" && ");
+    if (both != std::string_view::npos) {
+      return has(condition.substr(0, both)) && has(condition.substr(both + 4));
+    }
+    if (condition[0] == '!') return !has(condition.substr(1));
+    return features_.count(condition) != 0;
+  }
+
+  /// A header: constants are in place.
+  [[nodiscard]] std::string header(std::string_view file) {
+    RuntimeText placed = *this;
+    for (const auto& [name, value] : constants_) placed.word(name, value);
+    return placed.part(file);
+  }
+  /// A source: a head with the constants that the rest uses, and the rest.
+  [[nodiscard]] std::string source(const std::string& rest) {
+    std::string used;
+    for (const auto& [name, value] : constants_) {
+      if (uses(rest, name)) used += "#define " + name + " " + value + "\n";
+    }
+    lines("DESIGN_CONSTANTS", used.empty() ? used : used + "\n");
+    return part(runtime::head) + rest;
+  }
+
+  /// The part of a file that the design has.
+  [[nodiscard]] std::string part(std::string_view file) {
+    const std::size_t begin = file.find("#endif\n") + 7;  // behind its wrapping for C++
+    file = file.substr(begin, file.rfind("#ifdef __cplusplus\n") - begin);
+    std::vector<Branch> branches{{true, true, true}};
+    std::string text;
+    in_comment_ = false;
+    while (!file.empty()) {
+      const std::string_view line = file.substr(0, file.find('\n'));
+      file.remove_prefix(line.size() + 1);
+      if (chooses(line, branches) || !branches.back().is_active) continue;
+      const std::size_t first = line.find_first_not_of(' ');
+      const auto found = lines_.find(first < line.size() ? line.substr(first) : line);
+      if (found != lines_.end()) {
+        text += found->second;
+      } else if (begins(line, "#define ") && std::islower(static_cast<unsigned char>(line[8]))) {
+        const std::size_t blank = line.find(' ', 8);
+        word(std::string(line.substr(8, blank - 8)), std::string(line.substr(blank + 1)));
+      } else {
+        text += named(line) + "\n";
+      }
+    }
+    return text;
+  }
+
+  [[nodiscard]] static bool uses(std::string_view text, std::string_view word) {
+    for (std::size_t at = 0; (at = text.find(word, at)) != text.npos; at += word.size()) {
+      if (!is_letter(text[at - 1]) && !is_letter(text[at + word.size()])) return true;
+    }
+    return false;
+  }
+
+ private:
+  /// Of an `#if`, until its `#endif`. Others than of features stay in the text.
+  struct Branch {
+    bool is_of_features, is_active, was_taken;
+  };
+
+  static bool begins(std::string_view text, std::string_view with) {
+    return text.substr(0, with.size()) == with;
+  }
+  static bool is_letter(char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_';
+  }
+  static bool is_digit(char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0; }
+
+  /// Takes a line that chooses. @return whether it is no part of the text
+  [[nodiscard]] bool chooses(std::string_view line, std::vector<Branch>& branches) const {
+    const bool is_active = branches.back().is_active;
+    if (begins(line, "#if ")) {
+      const bool holds = is_active && has(line.substr(4));
+      branches.push_back({true, holds, holds || !is_active});
+      return true;
+    }
+    if (begins(line, "#if")) branches.push_back({false, is_active, true});
+    const bool ends = begins(line, "#endif");
+    if (!ends && !begins(line, "#el")) return false;
+    Branch& branch = branches.back();
+    const bool is_of_features = branch.is_of_features;
+    if (ends) {
+      branches.pop_back();
+    } else if (is_of_features) {
+      branch.is_active = !branch.was_taken && (!begins(line, "#elif") || has(line.substr(6)));
+      branch.was_taken = branch.was_taken || branch.is_active;
+    }
+    return is_of_features;
+  }
+
+  /// A line with what its words and numbers stand for.
+  [[nodiscard]] std::string named(std::string_view line) {
+    std::string out;
+    for (std::size_t at = 0; at < line.size();) {
+      if (line.substr(at, 2) == (in_comment_ ? "*/" : "/*")) in_comment_ = !in_comment_;
+      std::size_t end = at;
+      while (end < line.size() && is_letter(line[end])) ++end;
+      if (end == at) {
+        out += line[at++];
+        continue;
+      }
+      const bool is_number = is_digit(line[at]);
+      if (is_number && line.substr(end, 1) == "." && !in_comment_) {
+        do ++end;
+        while (end < line.size() && is_digit(line[end]));
+      }
+      const std::string word(line.substr(at, end - at));
+      const bool has_point = word.find('.') != std::string::npos;
+      out += is_number ? word + (has_point && single_ ? "f" : "") : named_word(word);
+      at = end;
+    }
+    return out;
+  }
+  [[nodiscard]] std::string named_word(const std::string& word) const {
+    if (const auto found = words_.find(word); found != words_.end()) return found->second;
+    if (begins(word, "esokit_")) return name_ + word.substr(6);
+    if (begins(word, "ESOKIT_")) return upper_ + word.substr(6);
+    return word;
+  }
+
+  bool single_;
+  bool in_comment_ = false;
+  std::string name_;
+  std::string upper_{};
+  std::set<std::string, std::less<>> features_{};
+  std::map<std::string, std::string> words_{};
+  std::map<std::string, std::string, std::less<>> lines_{};
+  std::vector<std::pair<std::string, std::string>> constants_{};
+};
+
+}  // namespace esokit::detail
