@@ -71,6 +71,7 @@ constexpr const char* calls[] = {"restart_at y",
                                  "refer r",
                                  "take_output u",
                                  "track",
+                                 "settle",
                                  "revise u",
                                  "arm_restart",
                                  "arm_hold",
@@ -123,6 +124,7 @@ detail::RecordedDesign design_of(Random& random) {
   d.error_based = kind == 1;
   d.compensates = kind == 2;
   d.predictive = kind == 3;
+  d.waits = is();
   const int law = random.index(3);
   d.law.kind = law == 0 ? RunningLaw::none : law == 1 ? RunningLaw::schedule : RunningLaw::filter;
   d.law.returns = law == 2 && is();

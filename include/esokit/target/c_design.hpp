@@ -151,6 +151,7 @@ class CDesign {
     const bool gains_stand = d.law.kind == RunningLaw::none;
     text_.feature("ESOKIT_CONTROLLER", d.is_controller);
     text_.feature("ESOKIT_PREDICTIVE", d.predictive);
+    text_.feature("ESOKIT_WAITS", d.predictive && d.waits);
     text_.feature("ESOKIT_ERROR_BASED", d.error_based);
     text_.feature("ESOKIT_COMPENSATOR", d.compensates);
     text_.feature("ESOKIT_SOFTENS", d.softens);
@@ -250,7 +251,7 @@ class CDesign {
   void set_measured() {
     const MeasuredNumbers& measured = design_.measured;
     std::size_t most = 0;
-    for (const auto& path : measured.paths) most = std::max(most, path.memory.size());
+    for (const auto& path : measured.paths) most = (std::max)(most, path.memory.size());
     const int count = static_cast<int>(measured.paths.size());
     const auto of_paths = [&](const char* name, const auto& of) {
       text_.word(name, listed(count, [&](int i) {

@@ -172,7 +172,7 @@ class StTranslator {
         line.substr(at + 1, line.find(' ', at + 1) - at - 1);
   }
   [[nodiscard]] const std::string& peek(std::size_t ahead = 0) const {
-    return tokens_[std::min(at_ + ahead, tokens_.size() - 1)].text;
+    return tokens_[(std::min)(at_ + ahead, tokens_.size() - 1)].text;
   }
   std::string next() {
     const std::string token = peek();
@@ -783,9 +783,9 @@ class StTranslator {
   }
   /// An LREAL beyond what a REAL holds, which not each compiler takes: times a power of 2^126.
   static std::string scaled(double value) {
-    const bool up = std::abs(value) > 1;
+    const bool up = (std::abs)(value) > 1;
     std::string by;
-    for (; std::abs(value) > 1e37 || (value != 0 && std::abs(value) < 1e-37);
+    for (; (std::abs)(value) > 1e37 || (value != 0 && (std::abs)(value) < 1e-37);
          value *= up ? 0x1p-126 : 0x1p126) {
       by += up ? " * 8.507059173023462E+37" : " * 1.1754943508222875E-38";
     }

@@ -18,7 +18,8 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 INCLUDE = HERE.parents[2] / "include"
-KINDS = [{"CONTROLLER"}, {"CONTROLLER", "ERROR_BASED"}, {"CONTROLLER", "COMPENSATOR"}, {"PREDICTIVE"}, set()]
+KINDS = [{"CONTROLLER"}, {"CONTROLLER", "ERROR_BASED"}, {"CONTROLLER", "COMPENSATOR"}, {"PREDICTIVE"},
+         {"PREDICTIVE", "WAITS"}, set()]
 LAWS = [{"TABLE", "GAIN_IS_KEPT"}, {"TABLE"}, {"SCHEDULE"}, {"FILTER"}, {"FILTER", "RETURNS"},
         {"FILTER", "WATCHED"}, {"FILTER", "RETURNS", "WATCHED"}]
 OF_LOOPS = ["DIVIDED", "STAYS_SAFE", "SAFE_INPUT", "SOFTENS", "MONITORED"]

@@ -158,6 +158,7 @@ typedef double real;
   bool refer(esokit_state *o, real r); \
   bool take_output(esokit_state *o, real u); \
   bool track(esokit_state *o); \
+  bool settle(esokit_state *o); \
   bool revise(esokit_state *o, real u); \
   bool arm_restart(esokit_state *o); \
   bool arm_hold(esokit_state *o); \
