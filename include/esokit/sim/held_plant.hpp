@@ -36,6 +36,7 @@ struct HeldPlant {
       detail::unroll<Inputs>([&](auto j)
                                  ESOKIT_INLINE_LAMBDA { sum = sum + disturbance(i, j) * d(j); });
       detail::unroll<Inputs>([&](auto j) ESOKIT_INLINE_LAMBDA { sum = sum + input(i, j) * u(j); });
+      detail::keep_scalar(sum);  // what is known last would wait for a pair of states
       next(i) = sum;
     });
     return next;

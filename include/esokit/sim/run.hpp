@@ -130,6 +130,34 @@ class RunChance {
   std::optional<CountedGaussian<S>> counted_losses_, counted_jitter_;
 };
 
+/// A signal of a run in its loop: a constant is read once, as no compiler knows that it is one.
+template <class Signal>
+class RunningSignal {
+  using Time = typename Signal::Time;
+  using Value = typename Signal::Value;
+
+ public:
+  explicit RunningSignal(const Signal& signal) : signal_(signal), constant_(signal.constant()) {
+    if (constant_) now_ = signal(Time(0));
+  }
+
+  /// Its value at t, from now on that of `now`.
+  ESOKIT_INLINE const Value& at(const Time& t) {
+    if (!constant_) now_ = signal_(t);
+    return now_;
+  }
+  [[nodiscard]] ESOKIT_INLINE const Value& now() const noexcept { return now_; }
+  /// A constant was checked before.
+  [[nodiscard]] ESOKIT_INLINE bool finite() const noexcept {
+    return constant_ || finite_throughout(now_);
+  }
+
+ private:
+  const Signal& signal_;
+  bool constant_;
+  Value now_{};
+};
+
 /// A run with checked settings.
 template <class P, class C>
 class Run {
@@ -210,11 +238,11 @@ class Run {
 
   /// Calls use(r), with derivatives if the controller takes them.
   template <class Use>
-  ESOKIT_INLINE void with(const Reference& reference, const Use& use) const {
+  ESOKIT_INLINE static void with(const Reference& reference, bool plain, const Use& use) {
     if constexpr (Types::references == 1) {
       use(in_scalar<Own>(reference(0)));
     } else if constexpr (Types::derivatives) {
-      if (config_.reference.plain()) {
+      if (plain) [[likely]] {
         use(in_scalar<Own>(reference(0)));
       } else {
         use(in_scalar<Own>(reference));
@@ -233,7 +261,10 @@ class Run {
     auto x = config_.state;
     Time t = config_.start_time;
     Time passed = sample_time_;  // time since the last sample
-    Reference reference = config_.reference(t);
+    RunningSignal reference(config_.reference);
+    RunningSignal disturbance(config_.disturbance);
+    (void)reference.at(t);
+    const bool plain = config_.reference.plain();
     const auto direct = [&] {
       if constexpr (Direct) {
         return steps_[0];
@@ -242,7 +273,7 @@ class Run {
       }
     }();
     if constexpr (controller_traits<C>.two_phases) {
-      with(reference, [&](const auto& r) { controller.set_reference(r); });
+      with(reference.now(), plain, [&](const auto& r) { controller.set_reference(r); });
     }
     for (std::int64_t k = 0;; ++k) {
       const Output y = output(t, x);
@@ -256,7 +287,7 @@ class Run {
         controller.measured(in_scalar<Own>(config_.measured(t)(0)));
       }
       Input u;
-      with(reference, [&](const auto& r) ESOKIT_INLINE_LAMBDA {
+      with(reference.now(), plain, [&](const auto& r) ESOKIT_INLINE_LAMBDA {
         using Wanted = ScalarOrVector<Own, Types::inputs>;
         u = in_scalar<S>(static_cast<Wanted>(
             esokit::detail::command(controller, in_scalar<Own>(measurement), r)));
@@ -276,13 +307,13 @@ class Run {
       }
       RunSample<P, C> sample{k, t, x, y, measurement, {}, u};
       if constexpr (channels) {
-        sample.reference = reference;
+        sample.reference = reference.now();
       } else {
-        sample.reference = reference(0);
+        sample.reference = reference.now()(0);
       }
-      reference = config_.reference(end);
+      (void)reference.at(end);
       if constexpr (controller_traits<C>.two_phases) {
-        with(reference, [&](const auto& r) { (void)controller.prepare(r); });
+        with(reference.now(), plain, [&](const auto& r) { (void)controller.prepare(r); });
       }
       if (!keep_going(on_sample, std::as_const(sample), controller)) {
         return RunEnd<P, C>{t, k + 1, x, std::move(controller), false};
@@ -290,8 +321,8 @@ class Run {
 
       bool good = true;
       if constexpr (Direct) {
-        const auto d = config_.disturbance(t);
-        good = finite_throughout(d);
+        const auto& d = disturbance.at(t);
+        good = disturbance.finite();
         x = direct(t, x, u, d);
       } else {
         inputs_.push(u);
@@ -301,8 +332,8 @@ class Run {
         }
         for (std::size_t i = 0; i < stretches_.size(); ++i) {
           const Time start = t + stretches_[i].start;
-          const auto d = config_.disturbance(start);
-          good = good && finite_throughout(d);
+          const auto& d = disturbance.at(start);
+          good = good && disturbance.finite();
           x = steps_[i](start, x, inputs_[stretches_[i].age], d);
         }
       }

@@ -43,10 +43,16 @@ constexpr bool finite_throughout(const T& value) noexcept {
   if constexpr (requires { all(is_finite(value)); }) {
     return all(is_finite(value));
   } else {
-    for (int i = 0; i < static_cast<int>(value.size()); ++i) {
-      if (!all(is_finite(value[i]))) return false;
-    }
-    return true;
+    // All elements of packs at once, as each test of all lanes is a branch. Of numbers a copy is
+    // tested, else the loop goes on with what the test has moved out of a floating-point register.
+    const auto finite_element = [&](int i) ESOKIT_INLINE_LAMBDA {
+      auto number = value[i];
+      esokit::detail::keep_scalar(number);
+      return is_finite(number);
+    };
+    auto finite = finite_element(0);
+    for (int i = 1; i < static_cast<int>(value.size()); ++i) finite = finite && finite_element(i);
+    return all(finite);
   }
 }
 
