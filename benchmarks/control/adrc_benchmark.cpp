@@ -1,6 +1,8 @@
 /// @file
-/// Controllers beside the update of the observer in them: what the loop, the law and the limits
-/// cost; Herbst's filter forms beside state space; what decorators cost.
+/// Controllers beside hand code with the same tests, and beside the update of the observer in them:
+/// what the loop, the law and the limits cost; what decorators cost.
+#include <bit>
+#include <cstdint>
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/variable_time.hpp>
@@ -9,8 +11,10 @@
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
+#include <limits>
 #include <optional>
 #include <string>
+#include <type_traits>
 
 #include "../support/run.hpp"
 #include "../support/update_patterns.hpp"
@@ -59,6 +63,74 @@ struct Pid {
   }
 };
 
+/// ADRC of order 2 with limits of u, as one writes it by hand for speed. It tests what Adrc tests:
+/// the new state (one sum of squares), u, whether a sample is missing, and a mode; it keeps what
+/// can be asked of Adrc (estimate, innovation, the u that the observer was given, the wanted and
+/// the limited u, a status). What is to be done then is left out.
+template <class S>
+struct HandWrittenAdrc {
+  S x0{}, x1{}, x2{}, innovation{}, applied{}, last{}, requested{};
+  S k0, k1, k2, scaled_input_gain, w0, w1, w2, lower, upper;
+  unsigned short missed = 0;
+  unsigned char status = 0;
+  bool special = false;
+
+  ESOKIT_INLINE static bool finite(S x) noexcept {
+    using Bits = std::conditional_t<sizeof(S) == 8, std::uint64_t, std::uint32_t>;
+    constexpr Bits exponent = std::bit_cast<Bits>(std::numeric_limits<S>::infinity());
+    return (std::bit_cast<Bits>(x) & exponent) != exponent;
+  }
+
+  ESOKIT_COLD S bad() noexcept {
+    status = 1;
+    ++missed;
+    return last;
+  }
+
+  ESOKIT_INLINE S update(S y, S r) noexcept {
+    if (special || missed != 0) [[unlikely]]
+      return bad();
+    const S u_applied = last;
+    const S driven = x2 + scaled_input_gain * u_applied;
+    const S half_way = x1 + driven;
+    const S p0 = x0 + half_way;
+    const S p1 = half_way + driven;
+    const S e = y - p0;
+    const S n0 = p0 + k0 * e;
+    const S n1 = p1 + k1 * e;
+    const S n2 = x2 + k2 * e;
+    if (!finite(n0 * n0 + n1 * n1 + n2 * n2)) [[unlikely]]
+      return bad();
+    x0 = n0;
+    x1 = n1;
+    x2 = n2;
+    innovation = e;
+    applied = u_applied;
+    status = 0;
+    S u = w0 * (r - n0) - (w1 * n1 + w2 * n2);
+    if (!finite(u)) [[unlikely]]
+      u = last;
+    requested = u;
+    u = u < lower ? lower : u;
+    u = upper < u ? upper : u;
+    last = u;
+    return u;
+  }
+};
+
+template <class S>
+HandWrittenAdrc<S> hand_written_adrc() {
+  return {.k0 = static_cast<S>(0.9),
+          .k1 = static_cast<S>(0.5),
+          .k2 = static_cast<S>(0.1),
+          .scaled_input_gain = static_cast<S>(1e-6),
+          .w0 = static_cast<S>(12.5),
+          .w1 = S(5e3),
+          .w2 = S(1e6),
+          .lower = S(-5),
+          .upper = S(5)};
+}
+
 /// Steps of two lengths in turn: every one is another than the last.
 template <class S>
 struct Jittering {
@@ -97,6 +169,11 @@ void add_all(const std::string& scalar) {
   beside_both.bank += "; " + against("bank", "pid/" + scalar);
   beside_both.out_of_line += "; " + against("call", "pid/" + scalar);
   beside_both.latency += "; " + against("latency", "pid/" + scalar);
+  add<S>("hand_written_adrc/2/" + scalar, hand_written_adrc<S>());
+  const std::string by_hand = "hand_written_adrc/2/" + scalar;
+  beside_both.bank += "; " + against("bank", by_hand, " <= 1.15");
+  beside_both.out_of_line += "; " + against("call", by_hand, " <= 1.05");
+  beside_both.latency += "; " + against("latency", by_hand, " <= 1.05");
   add<S>("adrc/2/" + scalar, adrc<S, LinearEso<2, S>>(linear), beside_both);
   add<S>("adrc/3/" + scalar, adrc<S, LinearEso<3, S>>(observer_config<S, 3>()));
 
