@@ -125,6 +125,7 @@
 #include <esokit/math/combinatorics.hpp>
 #include <esokit/math/dense.hpp>
 #include <esokit/math/fal.hpp>
+#include <esokit/math/fine_sum.hpp>
 #include <esokit/math/positivity.hpp>
 #include <esokit/math/power.hpp>
 #include <esokit/model/augmented_model.hpp>

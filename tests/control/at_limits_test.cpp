@@ -261,14 +261,15 @@ void parts() {
     }
     const auto path = [&](const char* what, double share) {
       esokit::MeasuredInput<S> input{.gain = S(1)};
-      if (*what == 'l') input.lag = decimal<S>(T * 1'000'000, 0) * S(share);
+      if (*what == 'l')
+        input.lag = decimal<S>(T * (sizeof(S) == 4 ? 131'072 : 1'000'000), 0) * S(share);
       if (*what == 'd') input.dead_time = decimal<S>(7 * T, places) * S(share);
       return refusal(
           MeasuredPath<S, 7>::validate(input, *what == 'l' ? decimal<S>(T, 0) : time, -1));
     };
     accepts_the_limit(
         "lag", [&](double share) { return path("l", share); }, above,
-        "inputs.lag: must be at most a million samples, s:");
+        "inputs.lag: must be at most a million samples (in float 131072), s:");
     accepts_the_limit(
         "dead_time", [&](double share) { return path("d", share); }, above,
         "inputs.dead_time: must be at most Capacity samples, s:");
@@ -278,6 +279,22 @@ void parts() {
 TEST(AtLimits, KnownParts) {
   parts<double>();
   parts<float>();
+}
+
+/// With the longest lag w still arrives: what arrives in a sample is not below the digits of it.
+template <class S>
+void arrives(long lag) {
+  auto path = esokit::detail::MeasuredPath<S, 1>(
+      {.gain = S(1), .lag = static_cast<S>(lag) * S(0.01)}, S(0.01));
+  path.push(S(1));
+  path.push(S(1));
+  for (long k = 0; k < 12 * lag; ++k) path.advance();
+  EXPECT_NEAR(static_cast<double>(path.mean()), 1.0, 1.0 / 128);
+}
+
+TEST(AtLimits, TheLongestLagArrives) {
+  arrives<float>(131'072);
+  arrives<double>(long_run(1'000'000));
 }
 
 /// 1 T and a thousandth more is "closer than a thousandth": refused. What is strictly below a limit

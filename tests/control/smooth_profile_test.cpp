@@ -313,5 +313,40 @@ TEST(SmoothProfile, RefusesByRule) {
             "sample_time: must be finite and positive");
 }
 
+/// Slow moves beside a large reference, of so many samples that one moves r by less than a digit:
+/// it arrives, and on the way is the profile in double but for a digit.
+TEST(SmoothProfile, LosesNoSmallStepInFloat) {
+  Random random(71);
+  for (int i = 0; i < 30; i += stride) {
+    const double base = random.uniform(-1, 1) * random.log_uniform(1, 1e6);
+    const float from = static_cast<float>(base);
+    const float to = from + std::fabs(from) * 1e-4f * static_cast<float>(random.uniform(-1, 1));
+    const int samples = 1000 + random.index(long_run(20'000));
+    const auto shortest = static_cast<float>(samples) * 1e-4f;
+    auto in_float = SmoothProfile<2, float>::make(
+                        {.limits = {0, 1e30f}, .shortest_time = shortest, .sample_time = 1e-4f})
+                        .value();
+    auto in_double = SmoothProfile<2>::make({.limits = {0, 1e30},
+                                             .shortest_time = static_cast<double>(shortest),
+                                             .sample_time = static_cast<double>(1e-4f)})
+                         .value();
+    ASSERT_TRUE(in_float.reset(from));
+    ASSERT_TRUE(in_double.reset(static_cast<double>(from)));
+    const double size = static_cast<double>(std::max(std::fabs(from), std::fabs(to)));
+    for (int k = 0; k < samples + 100; ++k) {
+      ASSERT_TRUE(in_float.update(to));
+      ASSERT_TRUE(in_double.update(static_cast<double>(to)));
+      // A sample more or less is what rounding the duration may cost.
+      const double a_sample = 2 * std::fabs(static_cast<double>(to - from)) / samples;
+      ASSERT_NEAR(static_cast<double>(in_float.motion()(0)), in_double.motion()(0),
+                  1.2e-7 * size + 8 * a_sample)
+          << k;
+    }
+    EXPECT_FALSE(in_float.moving());
+    EXPECT_EQ(in_float.motion()(0), to);
+    EXPECT_EQ(in_float.motion()(1), 0);
+  }
+}
+
 }  // namespace control_smooth_profile_test
 }  // namespace esokit_test

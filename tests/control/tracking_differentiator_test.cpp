@@ -5,6 +5,7 @@
 #include <cmath>
 #include <esokit/control/tracking_differentiator.hpp>
 #include <esokit/core/error_text.hpp>
+#include <limits>
 #include <string>
 #include <support/numbers.hpp>
 #include <support/refusal.hpp>
@@ -153,6 +154,48 @@ TEST(TrackingDifferentiator, RefusesByName) {
   EXPECT_EQ(text(1, 0.01, -1), "filter_time = -1: must be finite and not negative");
   EXPECT_EQ(refusal(TrackingDifferentiator<>::make({.acceleration = 1e-300, .sample_time = 1e-10})),
             "acceleration: times sample_time squared leaves the scalar's range");
+}
+
+/// It arrives from any place at any other, and stands still there, in float as in double: however
+/// small its steps are beside r.
+template <class S>
+void arrives_anywhere() {
+  Random random(53);
+  const double digit = static_cast<double>(std::numeric_limits<S>::epsilon());
+  for (int i = 0; i < 300; i += stride) {
+    const double h = random.log_uniform(1e-5, 1e-2);
+    const double R = random.log_uniform(1e-2, 1e3);
+    const double way = R * h * h * random.log_uniform(1, 1e6) / 4;
+    // So that the double digits, those of r and those kept beside it, hold a step R h^2.
+    const double base = random.uniform(-1, 1) * R * h * h * 1e-3 / (digit * digit * 64);
+    auto td = TrackingDifferentiator<S>::make(
+                  {.acceleration = static_cast<S>(R), .sample_time = static_cast<S>(h)})
+                  .value();
+    ASSERT_TRUE(td.reset(static_cast<S>(base)));
+    const S target = static_cast<S>(base + way);
+    const double distance =
+        std::fabs(static_cast<double>(target) - static_cast<double>(static_cast<S>(base)));
+    const int samples = static_cast<int>(2 * std::sqrt(distance / R) / h) + 50;
+    for (int k = 0; k < samples + samples / 10; ++k) ASSERT_TRUE(td.update(target));
+    EXPECT_LE(std::fabs(td.value() - target), std::numeric_limits<S>::epsilon() * std::fabs(target))
+        << "R " << R << ", h " << h << ", from " << base << " by " << distance;
+    EXPECT_LE(std::fabs(static_cast<double>(td.derivative())), 0.1 * R * h)
+        << "R " << R << ", h " << h << ", from " << base << " by " << distance;
+  }
+}
+
+TEST(TrackingDifferentiator, ArrivesAnywhere) {
+  arrives_anywhere<float>();
+  arrives_anywhere<double>();
+}
+
+/// The case of 10000 -> 10001 in float.
+TEST(TrackingDifferentiator, StandsStillBesideALargeReference) {
+  auto td = TrackingDifferentiator<float>::make({.acceleration = 10, .sample_time = 1e-4f}).value();
+  ASSERT_TRUE(td.reset(10000));
+  for (int k = 0; k < 20'000; ++k) ASSERT_TRUE(td.update(10001));
+  EXPECT_EQ(td.value(), 10001);
+  EXPECT_NEAR(td.derivative(), 0, 1e-5);
 }
 
 }  // namespace control_tracking_differentiator_test

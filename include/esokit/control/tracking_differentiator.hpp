@@ -6,6 +6,7 @@
 #include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/matrix.hpp>
+#include <esokit/math/fine_sum.hpp>
 
 namespace esokit {
 
@@ -38,7 +39,7 @@ struct TrackingDifferentiatorConfig {
 
 /// Tracking differentiator with fhan: r1 follows the reference as fast as |r1''| <= `acceleration`
 /// allows, and r2 = r1'. Because it can always stop in time, it stays r2^2 / (2R) behind a moving
-/// reference.
+/// reference. It arrives, and stands still there, however small its steps are beside r.
 template <class S = double>
 requires(detail::is_a_scalar<S>()) class TrackingDifferentiator {
  public:
@@ -66,35 +67,38 @@ requires(detail::is_a_scalar<S>()) class TrackingDifferentiator {
 
   /// One sample. False, and nothing changes, if the reference is not finite or too large.
   bool update(S reference) noexcept {
-    const S change = fhan(r1_ - reference, r2_, acceleration_, width_);
+    const S change = fhan(r1_.minus(reference), r2_.value(), acceleration_, width_);
+    auto r1 = r1_, r2 = r2_;
+    r1.add(sample_time_ * r2_.value());
+    r2.add(sample_time_ * change);
     // Without this test an infinite reference would be treated as a distant one.
-    return is_finite(reference) &&
-           move_to(r1_ + sample_time_ * r2_, r2_ + sample_time_ * change, change);
+    return is_finite(reference) && move_to(r1, r2, change);
   }
 
   /// r1, unit of the reference.
-  [[nodiscard]] S value() const noexcept { return r1_; }
+  [[nodiscard]] S value() const noexcept { return r1_.value(); }
   /// r2 = r1', unit of the reference / s.
-  [[nodiscard]] S derivative() const noexcept { return r2_; }
+  [[nodiscard]] S derivative() const noexcept { return r2_.value(); }
   /// (r1, r2).
-  [[nodiscard]] Vector<S, 2> state() const noexcept { return {r1_, r2_}; }
+  [[nodiscard]] Vector<S, 2> state() const noexcept { return {value(), derivative()}; }
 
   /// (r1, r1', r1''), 3 x 1: for a law that also takes the acceleration. r1'' is that of the last
   /// sample; its magnitude is at most `acceleration`.
-  [[nodiscard]] Vector<S, 3> motion() const noexcept { return {r1_, r2_, change_}; }
+  [[nodiscard]] Vector<S, 3> motion() const noexcept { return {value(), derivative(), change_}; }
 
   /// Restarts at rest at `value`; false, and nothing changes, if it is not finite.
-  bool reset(S value = S(0)) noexcept { return move_to(value, S(0), S(0)); }
+  bool reset(S value = S(0)) noexcept { return move_to(Sum(value), Sum(S(0)), S(0)); }
 
  private:
+  using Sum = detail::FineSum<S>;
   explicit TrackingDifferentiator(const Config& config)
       : acceleration_(config.acceleration),
         sample_time_(config.sample_time),
         width_(config.filter_time > S(0) ? config.filter_time : config.sample_time) {}
 
   /// False, and nothing changes, if one of them is not finite.
-  bool move_to(S r1, S r2, S change) noexcept {
-    if (!is_finite(r1) || !is_finite(r2)) return false;
+  bool move_to(const Sum& r1, const Sum& r2, S change) noexcept {
+    if (!is_finite(r1.value()) || !is_finite(r2.value())) return false;
     r1_ = r1;
     r2_ = r2;
     change_ = change;
@@ -104,8 +108,8 @@ requires(detail::is_a_scalar<S>()) class TrackingDifferentiator {
   S acceleration_;
   S sample_time_;
   S width_;
-  S r1_ = S(0);      ///< value
-  S r2_ = S(0);      ///< its derivative
+  Sum r1_{};         ///< value
+  Sum r2_{};         ///< its derivative
   S change_ = S(0);  ///< r1'' that the last sample applied
 };
 

@@ -43,9 +43,9 @@ class MeasuredPath {
     return Rules<S>{}
         .finite("inputs.gain", input.gain, index)
         .not_negative("inputs.lag", input.lag, index)
-        .demand(at_most(input.lag, S(S(1e6) * time)),
-                {"inputs.lag", input.lag, "must be at most a million samples, s:", index,
-                 S(1e6) * time, true})
+        .demand(at_most(input.lag, S(most_lag * time)),
+                {"inputs.lag", input.lag, "must be at most a million samples (in float 131072), s:",
+                 index, most_lag * time, true})
         .not_negative("inputs.dead_time", input.dead_time, index)
         .demand(at_most(input.dead_time, longest(time)),
                 {"inputs.dead_time", input.dead_time, "must be at most Capacity samples, s:", index,
@@ -125,6 +125,9 @@ class MeasuredPath {
  private:
   friend struct RecordAccess;
   static constexpr int length = Capacity + 2;
+  /// Samples of a lag: of a longer one the digits of w do not hold what arrives in a sample.
+  static constexpr S most_lag =
+      S(1) / (S(64) * rounding<S>()) < S(1e6) ? S(1) / (S(64) * rounding<S>()) : S(1e6);
   static S longest(const S& time) { return static_cast<S>(Capacity) * time; }
 
   [[nodiscard]] Course course() const noexcept {

@@ -10,6 +10,7 @@
 #include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/lanes.hpp>
+#include <esokit/math/fine_sum.hpp>
 #include <esokit/sim/counted_gaussian.hpp>
 #include <esokit/sim/gaussian.hpp>
 #include <esokit/sim/loop_steps.hpp>
@@ -260,6 +261,7 @@ class Run {
     // nothing changes it.
     auto x = config_.state;
     Time t = config_.start_time;
+    esokit::detail::FineSum<Time> clock(t);
     Time passed = sample_time_;  // time since the last sample
     RunningSignal reference(config_.reference);
     RunningSignal disturbance(config_.disturbance);
@@ -298,12 +300,14 @@ class Run {
       Time end = config_.start_time + static_cast<Time>(k + 1) * sample_time_;
       if constexpr (!Even) {
         passed = chance_.step_time(k, sample_time_);
-        if (!is_finite(passed) || passed < shortest() || passed > sample_time_ * Time(10)) {
+        if (!esokit::detail::at_most(shortest(), passed) ||
+            !esokit::detail::at_most(passed, Time(sample_time_ * Time(10)))) {
           return Error<Time>{
               "step_time", passed,       "must be 0.1 .. 10 times sample_time, which is",
               -1,          sample_time_, true};
         }
-        end = t + passed;
+        clock.add(passed);
+        end = clock.value();
       }
       RunSample<P, C> sample{k, t, x, y, measurement, {}, u};
       if constexpr (channels) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <esokit/core/scalar.hpp>
+#include <esokit/math/fine_sum.hpp>
 #include <esokit/sim/window.hpp>
 
 namespace esokit::sim {
@@ -31,10 +32,10 @@ class Trapezoid {
   }
 
   /// The integral so far; zero before two samples.
-  constexpr ScalarType value() const noexcept { return value_; }
+  constexpr ScalarType value() const noexcept { return value_.value(); }
 
   /// The time that it covers, s.
-  constexpr ScalarType duration() const noexcept { return duration_; }
+  constexpr ScalarType duration() const noexcept { return duration_.value(); }
 
   /// Forgets all samples, keeps the window.
   constexpr void reset() noexcept { *this = Trapezoid(window_); }
@@ -48,15 +49,15 @@ class Trapezoid {
     // Whole segments use the samples themselves, because interpolation would round them.
     const ScalarType f_from = from == time_ ? integrand_ : integrand_ + slope * (from - time_);
     const ScalarType f_to = to == t ? f : integrand_ + slope * (to - time_);
-    value_ += (f_from + f_to) / ScalarType{2} * (to - from);
-    duration_ += to - from;
+    value_.add((f_from + f_to) / ScalarType{2} * (to - from));
+    duration_.add(to - from);
   }
 
   Window<ScalarType> window_{};
   ScalarType time_{};
   ScalarType integrand_{};
-  ScalarType value_{};
-  ScalarType duration_{};
+  esokit::detail::FineSum<ScalarType> value_{};
+  esokit::detail::FineSum<ScalarType> duration_{};
   bool started_ = false;
 };
 
