@@ -19,6 +19,7 @@
 #include <esokit/observer/linear_eso.hpp>
 #include <sstream>
 #include <support/friction.hpp>
+#include <support/refusal.hpp>
 
 namespace esokit_test {
 namespace target_fixed_point_test {
@@ -779,6 +780,137 @@ TEST(FixedPoint, RefusesSettingsThatDoNotFit) {
   EXPECT_EQ(refusal_of(at(50)).substr(0, 15), "most_deviation:");
   options.code.settings_in_struct = false;
   EXPECT_EQ(refusal_of(at(50)).substr(0, 19), "settings_in_struct:");
+}
+
+/// The self-test plays the start hold, too, and the C begins as the controller does: with the u of
+/// the hold, or the one nearest to zero within the limits.
+TEST(FixedPoint, BeginsAsTheController) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  for (const double hold : {0.0, 0.01, 0.5}) {
+    for (const double input : {2.0, -1.0, 0.0}) {
+      for (const double rate : {0.0, 100.0}) {
+        for (const bool around_zero : {true, false}) {
+          auto config = servo_loop(rate);
+          if (!around_zero) {
+            if (!(input > 0)) continue;
+            config.limits.lower = 1.2;
+            config.missing.input = 1.2;
+          }
+          config.start_hold = {.time = hold, .input = input};
+          auto in_double = Servo::make(config).value();
+          const FixedPointOptions options = servo();
+          const auto made = to_fixed_c(in_double, options).value();
+          const Folder folder;
+          FixedInC<std::int32_t> c(folder, made.code, "gcc -std=c99", true);
+          ASSERT_TRUE(c.loaded());
+          EXPECT_EQ(c.self_test(), 0) << hold << ", " << input << ", " << rate;
+          for (int k = 0; k < 20; ++k) {
+            const double wanted = in_double.update(0.5, 0.5) / options.u.unit;
+            const std::int32_t at = static_cast<std::int32_t>(0.5 / options.y.unit);
+            EXPECT_NEAR(c.control(c.state.data(), at, at), wanted,
+                        1 + made.input.deviation + made.input.by_gains)
+                << "hold " << hold << ", " << input << ", " << rate << ", sample " << k;
+          }
+        }
+      }
+    }
+  }
+}
+
+/// What a refusal of settings says helps wherever it is printed: of faster and slower designs, of
+/// observers and controllers.
+TEST(FixedPoint, RoomForOtherSettingsHelpsWhereverTheyAreRefused) {
+  Random random(61);
+  int refused = 0;
+  const auto judge = [&](const auto& first, const auto& second, FixedPointOptions options) {
+    const auto one = to_fixed_c(first, options);
+    const auto two = to_fixed_c(second, options);
+    if (!one || !two) return;
+    auto behind = options;
+    behind.settings_for = &*one;
+    const auto simply = to_fixed_c(second, behind);
+    if (simply) return;
+    if (std::string(simply.error().field) != "settings_for") return;
+    EXPECT_NE(std::string(simply.error().rule).find("with room_for, the code of this design alone"),
+              std::string::npos);
+    ++refused;
+    options.room_for = {&*two};
+    const auto running = to_fixed_c(first, options);
+    ASSERT_TRUE(running) << esokit_test::refusal(running);
+    behind.settings_for = &*running;
+    const auto settings = to_fixed_c(second, behind);
+    EXPECT_TRUE(settings) << esokit_test::refusal(settings);
+  };
+  for (int i = 0; i < 150; i += stride) {
+    FixedPointOptions options;
+    options.y = {.unit = random.log_uniform(1e-4, 1e-2), .most = 500 + random.index(7500)};
+    options.u = {.unit = 0.01, .most = 1000};
+    options.innovation_bits = i % 2 == 0 ? 16 : 32;
+    options.code.name = "eso";
+    options.code.settings_in_struct = true;
+    options.most_deviation.assign(3, 1e30);
+    options.most_input_deviation = 1e30;
+    auto config = servo_loop();
+    config.limits = {.lower = -10, .upper = 10};
+    config.observer.input_gain = random.log_uniform(1, 1000);
+    config.observer.max_gap = 1 + random.index(6);
+    config.observer.observer_bandwidth = random.log_uniform(20, 300);
+    config.controller_bandwidth = config.observer.observer_bandwidth / random.uniform(3, 10);
+    auto other = config;
+    other.observer.observer_bandwidth *= random.log_uniform(0.1, 10);
+    other.controller_bandwidth *= random.log_uniform(0.1, 10);
+    judge(Servo::make(config).value(), Servo::make(other).value(), options);
+    judge(LinearEso<2>::make(config.observer).value(), LinearEso<2>::make(other.observer).value(),
+          options);
+  }
+  EXPECT_GT(refused, sanitized ? 20 : 100);
+}
+
+/// Of several at once, and what is written is the code that it says: in each bit, as the settings
+/// written alone.
+TEST(FixedPoint, RoomForSeveral) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  FixedPointOptions options = servo();
+  options.code.settings_in_struct = true;
+  options.most_deviation.assign(3, 1e30);
+  options.most_input_deviation = 1e30;
+  std::vector<FixedCode> alone;
+  const auto design = [](double bandwidth) {
+    auto config = servo_loop();
+    config.observer.observer_bandwidth = bandwidth;
+    config.controller_bandwidth = bandwidth / 4;
+    return Servo::make(config).value();
+  };
+  for (const double bandwidth : {15.0, 40.0, 250.0}) {
+    alone.push_back(to_fixed_c(design(bandwidth), options).value());
+  }
+  for (const FixedCode& one : alone) options.room_for.push_back(&one);
+  const auto running = to_fixed_c(design(100), options).value();
+  options.settings_for = &running;
+  options.code.settings_name = "other";
+  for (const double bandwidth : {15.0, 40.0, 250.0}) {
+    const auto other = to_fixed_c(design(bandwidth), options);
+    ASSERT_TRUE(other) << bandwidth << ": " << esokit_test::refusal(other);
+    const Folder folder;
+    FixedInC<std::int32_t> c(folder, joined(running, *other), "gcc -std=c99", true);
+    const Folder apart;
+    FixedInC<std::int32_t> itself(apart, other->code, "gcc -std=c99", true);
+    ASSERT_TRUE(c.loaded() && itself.loaded());
+    EXPECT_EQ(c.self_test(), 0);
+    EXPECT_EQ(c.adopt(c.state.data(), c.other), 0u);
+    Random random(83);
+    for (int k = 0; k < 5000; ++k) {
+      const std::int32_t r = random.index(2001) - 1000;
+      const std::int32_t y = random.index(4097) - 2048;
+      ASSERT_EQ(c.control(c.state.data(), y, r), itself.control(itself.state.data(), y, r)) << k;
+    }
+  }
+  const auto of_another_kind = to_fixed_c(observer<LinearEso<2>>(100, 1e-3), [&] {
+    auto changed = options;
+    changed.settings_for = nullptr;
+    return changed;
+  }());
+  EXPECT_EQ(esokit_test::refusal(of_another_kind), "room_for: must be the codes of such objects");
 }
 
 }  // namespace target_fixed_point_test

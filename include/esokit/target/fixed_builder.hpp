@@ -157,17 +157,25 @@ class FixedBuilder : public FixedRecord {
       const double largest = most > 0 ? std::floor(1073741824.0 / most) : most_gain;
       const double least = most > 0 ? largest / 8 : double{least_gain};
       const auto gain = [&](int s) { return std::fabs(c) * std::ldexp(1.0, s + offset); };
-      auto& scales = of->layout.products[list == &of->law ? 1 : 0];
+      const std::size_t which = list == &of->law ? 1 : 0;
+      auto& scales = of->layout.products[which];
       const bool known = of->given_ != nullptr && products < scales.size();
+      // Of all settings that are to fit.
+      const auto& room = of->room_.gains[which];
+      const double size = std::fmax(std::fabs(c), products < room.size() ? room[products] : 0.0);
+      const auto all = [&](int s) { return size * std::ldexp(1.0, s + offset); };
       int s = known ? scales[products] : scale;
-      while (!known && gain(s) > largest) --s;
+      while (!known && all(s) > largest) --s;
       if (gain(s) > largest) of->gain_too_large_ = gain(s) / largest;
-      if (known || !(gain(s) > 0)) {
+      if (known || !(all(s) > 0)) {
         // As it is.
-      } else if (full || gain(s) < (most > 0 ? double{least_gain} : least)) {
-        while (gain(s + 1) <= largest && (full || gain(s) < largest / 4)) ++s;
+      } else if (full || all(s) < (most > 0 ? double{least_gain} : least)) {
+        while (all(s + 1) <= largest && (full || all(s) < largest / 4)) ++s;
       }
-      if (!known) scales.push_back(s);
+      if (!known) {
+        scales.push_back(s);
+        of->layout.gains[which].push_back(std::fabs(c));
+      }
       list->setting = varies ? static_cast<int>(products) : -1;
       ++products;
       const auto rounded = static_cast<std::int32_t>(std::lround((std::min)(gain(s), largest)));
@@ -318,7 +326,7 @@ class FixedBuilder : public FixedRecord {
   bool refuse_settings(double times) {
     return refuse("settings_for", times,
                   "times what the scales of that code hold comes of these gains: write that code "
-                  "from this design, and the other as its settings");
+                  "with room_for, the code of this design alone");
   }
 
   void build(const std::vector<bool>& keeps) {
@@ -326,7 +334,10 @@ class FixedBuilder : public FixedRecord {
     update = IntegerList(n + 2);
     narrow_lines_.clear();
     gain_too_large_ = 0;
-    if (given_ == nullptr) layout.products[0].clear();
+    if (given_ == nullptr) {
+      layout.products[0].clear();
+      layout.gains[0].clear();
+    }
     const RecordedCall& call = called("observe");
     const std::vector<double> given{column, column};
     of_u_ = options_.u.unit / options_.y.unit;
@@ -346,7 +357,9 @@ class FixedBuilder : public FixedRecord {
     for (std::size_t i = 0; i < n; ++i) {
       update.owner = static_cast<int>(i);
       int s = static_cast<int>(std::floor(std::log2(fits / forced_[i])));
-      written.scale[i] = given_ != nullptr ? given_->scale[i] : s - coarser_[static_cast<int>(i)];
+      s -= coarser_[static_cast<int>(i)];
+      if (i < room_.scale.size()) s = (std::min)(s, room_.scale[i]);
+      written.scale[i] = given_ != nullptr ? given_->scale[i] : s;
       if (!keeps[i])
         builder.words.push_back(update.state(static_cast<int>(i), written.scale[i], 0, nullptr));
       else

@@ -35,6 +35,13 @@ class FixedDesign : public FixedBuilder {
       }
       keeps = given_->keeps;
     }
+    if (!room_.scale.empty()) {
+      if (room_.keeps.size() != states() || (room_.law_scale > 0) != design_->is_controller) {
+        return refuse("room_for", static_cast<double>(states()),
+                      "must be the codes of such objects");
+      }
+      keeps = room_.keeps;
+    }
     for (;;) {
       if (!builds(keeps)) return false;
       bounds();
@@ -310,6 +317,7 @@ class FixedDesign : public FixedBuilder {
     for (std::size_t i = 0; i < n; ++i) range += std::fabs(exact_law_[i]) * reach[i];
     range += std::fabs(exact_law_[n]) * reference_most() + options_.u.most;
     law_scale = (std::min)(16, static_cast<int>(std::floor(std::log2(fits / 2 / range))));
+    if (room_.law_scale > 0) law_scale = (std::min)(law_scale, room_.law_scale);
     if (given_ != nullptr) {
       if (law_scale < given_->law_scale) {
         return refuse_settings(std::ldexp(1.0, given_->law_scale - law_scale));
@@ -324,7 +332,10 @@ class FixedDesign : public FixedBuilder {
             "them beside a quarter of a count: lower the controller's bandwidth or y.most");
       }
       law = IntegerList(n + 1);
-      if (given_ == nullptr) layout.products[1].clear();
+      if (given_ == nullptr) {
+        layout.products[1].clear();
+        layout.gains[1].clear();
+      }
       Builder builder{this,
                       &call,
                       linear(call, {column}),

@@ -39,6 +39,10 @@ struct FixedPointOptions {
   CodeOptions code{};               ///< name and comment, and whether settings are in a struct
   const FixedCode* settings_for = nullptr;  ///< with CodeOptions::settings_in_struct: the design is
                                             ///< for `name_adopt` of this code, with its scales
+  /// With CodeOptions::settings_in_struct: other designs, each written alone with these options,
+  /// that are to become settings of this code. It takes scales that hold all of them; the gains of
+  /// each have fewer bits then, see FixedBound::by_gains.
+  std::vector<const FixedCode*> room_for{};
 };
 
 /// What rounding can do to an estimate or to u.
@@ -69,6 +73,7 @@ struct FixedLayout {
   std::map<int, int> narrow{};                 ///< scales of what has 16 bits, by its owner
   std::map<int, int> left_over{};              ///< scales of what is left over, by its owner
   std::array<std::vector<int>, 2> products{};  ///< scales of the products, of update and law
+  std::array<std::vector<double>, 2> gains{};  ///< what is multiplied by there, in magnitude
   int law_scale = 0;                           ///< u is kept in 2^-law_scale counts
   std::uint32_t mark = 0;                      ///< of the text
 };

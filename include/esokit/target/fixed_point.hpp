@@ -31,7 +31,12 @@ namespace detail {
 class FixedPlayer {
  public:
   explicit FixedPlayer(const FixedDesign& design)
-      : design_(&design), words_(design.states(), 0), rests_(design.states(), 0) {}
+      : held(design.start_held()),
+        design_(&design),
+        words_(design.states(), 0),
+        rests_(design.states(), 0),
+        last_(held << design.law_scale),
+        hold_left_(design.design().loop.hold_left) {}
 
   /// @param y in counts, of a counter its change
   void observe(std::int64_t y, std::int64_t u) {
@@ -44,12 +49,17 @@ class FixedPlayer {
     }
   }
   std::int64_t control(std::int64_t r) {
-    std::vector<std::int64_t> results;
-    (void)design_->law.run(words_, rests_, {r}, results);
     const std::int64_t one = std::int64_t(1) << design_->law_scale;
     const auto low = static_cast<std::int64_t>(design_->lower) * one;
     const auto high = static_cast<std::int64_t>(design_->upper) * one;
-    std::int64_t u = results[static_cast<std::size_t>(design_->law_line)];
+    std::int64_t u = design_->hold_counts() * one;
+    if (hold_left_ > 0) {
+      --hold_left_;
+    } else {
+      std::vector<std::int64_t> results;
+      (void)design_->law.run(words_, rests_, {r}, results);
+      u = results[static_cast<std::size_t>(design_->law_line)];
+    }
     if (design_->rate > 0) {
       const auto step =
           static_cast<std::int64_t>(std::floor(std::ldexp(design_->rate, design_->law_scale)));
@@ -61,13 +71,14 @@ class FixedPlayer {
     return held;
   }
   [[nodiscard]] std::int64_t next_word(std::size_t i) const { return words_[i]; }
-  std::int64_t held = 0;
+  std::int64_t held;
 
  private:
   const FixedDesign* design_;
   std::vector<std::int64_t> words_;
   std::vector<std::int64_t> rests_;
-  std::int64_t last_ = 0;
+  std::int64_t last_;
+  unsigned hold_left_;
 };
 
 /// The text of a design.
@@ -512,7 +523,9 @@ class FixedText {
                                               : "  if ((o->mode == $NAME_SAFE) && (o->gap < 1u)) "
                                                 "{\n    o->mode = $NAME_RUNNING;\n  }\n"},
               {"$SAFE_INPUT", loop.has_safe_input ? fine(loop.safe_input) : "o->u_last"},
-              {"$HOLD_INPUT", fine(loop.hold_input)},
+              {"$HOLD_INPUT", text_of(d_.hold_counts() * one)},
+              {"$START_FINE", text_of(d_.start_held() * one)},
+              {"$START_HELD", text_of(d_.start_held())},
               {"$HOLD_LEFT", std::to_string(loop.hold_left)},
               {"$MODE", loop.hold_left > 0 ? "$NAME_START_HOLD" : "$NAME_RUNNING"},
               {"$VECTORS", vectors},
@@ -566,8 +579,17 @@ class FixedText {
 /// FixedPointOptions::settings_for. The scales are those of the running code; gains that do not fit
 /// into them, ranges that would overflow and bounds above what is allowed are refused here. A
 /// switch holds each state within the range of the new settings, so no sequence of switches
-/// overflows; the bounds hold again as what the old settings left decays. Write the running code
-/// from the design with the largest gains.
+/// overflows; the bounds hold again as what the old settings left decays.
+///
+/// Larger gains overflow the scales of a design, and so do the wider ranges of a slower one, in
+/// which what u does lasts longer. So write each design alone first, then the running code with all
+/// of them in FixedPointOptions::room_for, then each with `settings_for` that code:
+///
+///     const auto alone = to_fixed_c(slow, options);
+///     options.room_for = {&*alone};
+///     const auto running = to_fixed_c(fast, options);
+///     options.settings_for = &*running;
+///     const auto settings = to_fixed_c(slow, options);  // its code.settings
 /// @param object as `make` returned it; the C begins at rest at zero
 /// @return error, with what would do, for ranges that 32 bits cannot hold, a bound above what is
 ///         allowed, and designs that are not linear or have what is not written in fixed point
@@ -579,6 +601,11 @@ Expected<FixedCode, Error<typename Object::scalar_type>> to_fixed_c(
   if (!recorded) return recorded.error();
   const bool given = options.settings_for != nullptr;
   detail::FixedDesign design(*recorded, options, given ? &options.settings_for->layout : nullptr);
+  std::vector<FixedLayout> others;
+  for (const FixedCode* other : options.room_for) {
+    if (other != nullptr) others.push_back(other->layout);
+  }
+  if (!given) design.make_room(others);  // that code has it
   if (!design.make()) {
     const detail::FixedRefusal& no = design.refusal;
     return Error<V>{no.field, static_cast<V>(no.value), no.rule,

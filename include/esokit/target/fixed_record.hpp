@@ -37,6 +37,35 @@ class FixedRecord {
     narrow_scale_ = given->narrow;
     left_over_scale_ = given->left_over;
   }
+  /// @param others layouts of designs whose settings are to fit, too; none: as they are
+  void make_room(const std::vector<FixedLayout>& others) {
+    for (const FixedLayout& other : others) {
+      const bool first = room_.scale.empty();
+      const auto join = [first](auto& all, const auto& more, const auto& either) {
+        if (first) all.assign(more.begin(), more.end());
+        for (std::size_t i = 0; i < all.size() && i < more.size(); ++i) {
+          all[i] = either(all[i], more[i]);
+        }
+      };
+      const auto least = [](auto a, auto b) { return a < b ? a : b; };
+      const auto most = [](auto a, auto b) { return a < b ? b : a; };
+      join(room_.scale, other.scale, least);
+      join(room_.keeps, other.keeps, [](bool a, bool b) { return a || b; });
+      for (std::size_t k = 0; k < 2; ++k) join(room_.gains[k], other.gains[k], most);
+      room_.law_scale = first ? other.law_scale : least(room_.law_scale, other.law_scale);
+      rounds_ = rounds_ || other.rounds;
+      // Of a state it is in its scale.
+      for (const auto& [owner, bits] : other.coarser) {
+        if (owner >= static_cast<int>(other.scale.size())) {
+          coarser_[owner] = most(coarser_[owner], bits);
+        }
+      }
+      for (const auto& [owner, scale] : other.narrow) {
+        const auto there = narrow_scale_.find(owner);
+        narrow_scale_[owner] = there == narrow_scale_.end() ? scale : least(there->second, scale);
+      }
+    }
+  }
   FixedLayout layout{};
 
   FixedRefusal refusal{};
@@ -62,6 +91,16 @@ class FixedRecord {
   [[nodiscard]] std::size_t states() const { return numbers.size(); }
   [[nodiscard]] const RecordedDesign& design() const { return *design_; }
   [[nodiscard]] const FixedPointOptions& options() const { return options_; }
+  /// u of the start hold, in counts.
+  [[nodiscard]] std::int64_t hold_counts() const {
+    return static_cast<std::int64_t>(std::nearbyint(design_->loop.hold_input / options_.u.unit));
+  }
+  /// u before the first sample, in counts: as of the controller, that of the hold, or the nearest
+  /// to zero within the limits.
+  [[nodiscard]] std::int64_t start_held() const {
+    const std::int64_t first = design_->loop.hold_left > 0 ? hold_counts() : 0;
+    return std::clamp(first, static_cast<std::int64_t>(lower), static_cast<std::int64_t>(upper));
+  }
   [[nodiscard]] double reference_most() const {
     return wraps_ ? std::ldexp(1.0, options_.y.counter_bits - 1) : options_.y.most;
   }
@@ -195,7 +234,8 @@ class FixedRecord {
     if (design_->law.watches) {
       return refuse("outlier_threshold", 1, "is not written in fixed point");
     }
-    if (options_.settings_for != nullptr && design_->settings.empty()) {
+    if ((options_.settings_for != nullptr || !options_.room_for.empty()) &&
+        design_->settings.empty()) {
       return refuse("settings_in_struct", 0, "must be true for settings_for, here and there");
     }
     if (design_->loop.divider > 1) {
@@ -318,6 +358,7 @@ class FixedRecord {
 
   const RecordedDesign* design_;
   const FixedLayout* given_ = nullptr;
+  FixedLayout room_{};         ///< what other settings need
   double gain_too_large_ = 0;  ///< times what its scale holds
   FixedPointOptions options_;
   bool wraps_;

@@ -367,8 +367,8 @@ $NAME_APART static int32_t update_guarded($name_state *o, $Y_TYPE y, $Y_TYPE r)
 void $name_init($name_state *o)
 {
 $INIT  (void)rest_at(o, 0, 0);
-  o->u_last = 0;
-  o->u_held = 0;
+  o->u_last = $START_FINE;
+  o->u_held = $START_HELD;
   o->hold_left = $HOLD_LEFTu;
   o->mode = $MODE;
   o->status = 0u;
