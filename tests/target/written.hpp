@@ -210,13 +210,24 @@ inline void compiles_elsewhere(const CCode& code, const std::string& name) {
   }
 }
 
+/// Would a test notice? ESOKIT_MUTANT='o->gap > 1u@@o->gap > 2u' changes the text once, if it has it.
+inline std::string mutant(std::string text) {
+  const char* given = std::getenv("ESOKIT_MUTANT");
+  if (given == nullptr) return text;
+  const std::string change = given;
+  const std::size_t middle = change.find("@@");
+  const std::size_t at = text.find(change.substr(0, middle));
+  if (at != std::string::npos) text.replace(at, middle, change.substr(middle + 2));
+  return text;
+}
+
 /// Compiled and loaded C, with what a test adds to it.
 class Library {
  public:
   Library(const Folder& folder, const CCode& code, const std::string& more,
           const std::string& compiler = "gcc -std=c99") {
     folder.write("loop.h", code.header);
-    folder.write("loop.c", code.source);
+    folder.write("loop.c", mutant(code.source));
     folder.write("probe.c", "#include \"loop.h\"\n" + more);
     const std::string out = folder.file("loop" + std::to_string(count++) + ".so");
     if (!runs(compiler + " -O2 -shared -fPIC -DLOOP_SELF_TEST" + std::string(strict) + "-o " + out +
@@ -323,6 +334,8 @@ class InC {
   /// status + 256 mode + 65536 gap
   unsigned probe() { return probe_(state_.data()); }
   int self_test(V tolerance) { return self_test_(tolerance); }
+  /// Its bytes: a copy of them may be put back.
+  std::vector<std::uint64_t>& state() { return state_; }
 
  private:
   Library library_;
