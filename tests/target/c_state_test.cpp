@@ -1,0 +1,104 @@
+// An object is written with its state: the C goes on where the C++ is.
+#include <esokit/adapter/delayed_input.hpp>
+#include <esokit/adapter/guarded.hpp>
+#include <esokit/adapter/measured.hpp>
+#include <esokit/adapter/outlier_gate.hpp>
+#include <esokit/adapter/wrapped_output.hpp>
+#include <esokit/control/adrc.hpp>
+#include <esokit/observer/algebraic_eso.hpp>
+#include <esokit/observer/cascade_eso.hpp>
+#include <esokit/observer/extended_state_filter.hpp>
+#include <esokit/observer/linear_eso.hpp>
+#include <target/written.hpp>
+
+namespace esokit_test {
+namespace target_c_state_test {
+
+#if ESOKIT_LOADS_C
+
+/// A swinging y, at times an outlier.
+template <class V>
+V measurement(Random& random, int k) {
+  const double outlier = random.index(30) == 0 ? random.uniform(-1, 1) : 0;
+  return static_cast<V>(std::sin(0.05 * k) + outlier + 1e-3 * random.uniform(-1, 1));
+}
+
+template <class Observer>
+void goes_on(std::uint64_t seed) {
+  SCOPED_TRACE(testing::internal::GetTypeName<Observer>());
+  using V = typename Observer::scalar_type;
+  for (const int before : {1, 7, 300, 2000}) {
+    auto observer = Observer::make(observer_config<Observer>(8)).value();
+    Random random(seed++);
+    const auto u = [&](int k) { return static_cast<V>(std::cos(0.05 * k)); };
+    const auto tell = [&](int k, auto... in_c) {
+      const V w = static_cast<V>(std::sin(0.03 * k));
+      if constexpr (requires { observer.measured(w); }) {
+        observer.measured(w);
+        (in_c->measured(w), ...);
+      }
+    };
+    for (int k = 0; k < before; ++k) {
+      tell(k);
+      if constexpr (requires { observer.set_pin(Pin::upper); }) {
+        if (k == before / 2) observer.set_pin(Pin::upper);
+        if (k == before - 3) observer.set_pin(Pin::free);
+      }
+      if (k + 20 < before && random.index(20) == 0) {
+        (void)observer.predict(u(k));
+      } else {
+        (void)observer.update(measurement<V>(random, k), u(k));
+      }
+    }
+    while (observer.missed() > 0) (void)observer.update(measurement<V>(random, before), V(0));
+    const Folder folder;
+    InC<V> in_c(folder, to_c(observer, {.name = "loop"}).value(), false);
+    ASSERT_TRUE(in_c.loaded());
+    EXPECT_EQ(in_c.self_test(V(0)), 0);
+    compare_estimates(observer, in_c, before);
+    for (int k = before; k < before + 500 && !testing::Test::HasFailure(); ++k) {
+      tell(k, &in_c);
+      const V y = measurement<V>(random, k);
+      EXPECT_EQ(static_cast<unsigned>(observer.update(y, u(k))), in_c.observe(y, u(k))) << k;
+      compare_estimates(observer, in_c, k);
+    }
+  }
+}
+
+TEST(CState, OfObservers) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  goes_on<WrappedOutput<OutlierGate<LinearEso<2, double>>>>(1);
+  goes_on<DelayedInput<CascadeEso<1, 2, float>, 4>>(11);
+  goes_on<Guarded<LinearEso<2, double>>>(21);
+  goes_on<Measured<LinearEso<1, float>, 1, 4>>(31);
+  goes_on<AlgebraicEso<1, float>>(41);
+  goes_on<ExtendedStateFilter<1, double>>(51);
+}
+
+TEST(CState, OfControllers) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  using C = Adrc<WrappedOutput<LinearEso<2, float>>>;
+  auto settings = config<C>(8);
+  settings.start_hold = {.time = 0.25F};  // 32 samples
+  for (const int before : {0, 1, 20, 31, 32, 300}) {
+    C controller = C::make(settings).value();
+    Random random(61);
+    const auto r = [](int k) { return static_cast<float>(0.5 * std::cos(0.01 * k)); };
+    for (int k = 0; k < before; ++k) (void)controller.update(measurement<float>(random, k), r(k));
+    const Folder folder;
+    InC<float> in_c(folder, to_c(controller, {.name = "loop"}).value(), true);
+    ASSERT_TRUE(in_c.loaded());
+    EXPECT_EQ(in_c.self_test(0), 0);
+    for (int k = before; k < before + 500 && !testing::Test::HasFailure(); ++k) {
+      const float y = measurement<float>(random, k);
+      EXPECT_TRUE(equal_bits(controller.update(y, r(k)), in_c.update(y, r(k))))
+          << before << ", sample " << k;
+      compare_estimates(controller.observer(), in_c, k);
+    }
+  }
+}
+
+#endif  // ESOKIT_LOADS_C
+
+}  // namespace target_c_state_test
+}  // namespace esokit_test
