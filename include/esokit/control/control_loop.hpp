@@ -216,17 +216,7 @@ class ControlLoop {
         status_ = StepStatus::ok;
         return limited(law(false));
       }
-      if (special_) [[unlikely]] {
-        observe_specially<Advanced>(measured, drive);
-        return put_out(law);
-      }
-      const StepStatus status = observe<Advanced>(measured, drive);
-      status_ = status;
-      if (status != StepStatus::ok) [[unlikely]] {
-        after_trouble(measured);
-        return put_out(law);
-      }
-      return limited(law(false));
+      return step_any<Advanced>(measured, drive, law);
     }
   }
 
@@ -360,18 +350,22 @@ class ControlLoop {
   }
 
   template <bool Advanced, class Law>
-  ESOKIT_COLD S step_seldom(S measured, S drive, Law law) noexcept {
-    if (special_) {
+  ESOKIT_INLINE S step_any(S measured, S drive, Law& law) noexcept {
+    if (special_) [[unlikely]] {
       observe_specially<Advanced>(measured, drive);
       return put_out(law);
     }
     const StepStatus status = observe<Advanced>(measured, drive);
     status_ = status;
-    if (status != StepStatus::ok) {
+    if (status != StepStatus::ok) [[unlikely]] {
       after_trouble(measured);
       return put_out(law);
     }
     return limited(law(false));
+  }
+  template <bool Advanced, class Law>
+  ESOKIT_COLD S step_seldom(S measured, S drive, Law law) noexcept {
+    return step_any<Advanced>(measured, drive, law);
   }
 
   template <class Law>
