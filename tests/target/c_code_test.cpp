@@ -142,10 +142,12 @@ TEST(CCode, RefusesByName) {
   plain.observer.max_gap = 20;
   EXPECT_EQ(refusal(plain, {}), "");
   for (const char* name : {"", "2nd", "a-b", "a b"}) {
-    EXPECT_EQ(refusal(plain, {.name = name}), "name: must be an identifier of C");
+    EXPECT_EQ(refusal(plain, {.name = name}),
+              "name: must be an identifier of C: this is the place of its first wrong character");
   }
   EXPECT_EQ(refusal(plain, {.settings_in_struct = true, .settings_name = "a-b"}),
-            "settings_name: must be an identifier of C");
+            "settings_name: must be an identifier of C: this is the place of its first wrong "
+            "character");
   EXPECT_EQ(refusal(plain, {.settings_in_struct = true, .settings_name = "slow"}), "");
   EXPECT_EQ(refusal(plain, {.name = "_a2"}), "");
   EXPECT_EQ(refusal(plain, {.self_test_samples = 0}), "self_test_samples: must be 1 .. 10000");
@@ -153,7 +155,8 @@ TEST(CCode, RefusesByName) {
   EXPECT_EQ(refusal(plain, {.self_test_samples = 10000}), "");
   EXPECT_EQ(refusal(plain, {.self_test_samples = 10001}), "self_test_samples: must be 1 .. 10000");
   for (const char* comment : {"ends */ here", "begins /* here", "ends *) here"}) {
-    EXPECT_EQ(refusal(plain, {.comment = comment}), "comment: must not begin or end a comment");
+    EXPECT_EQ(refusal(plain, {.comment = comment}),
+              "comment: must not begin or end a comment, nor a line of it with a backslash");
   }
   const std::string odd = "$name, $TIME, $COMMENT * / 50 %";
   const auto commented = to_c(C::make(plain).value(), {.comment = odd});

@@ -32,6 +32,12 @@ inline CCode c_texts(const RecordedDesign& design, const std::string& mark) {
   return {text.header(), text.source(), text.settings_file()};
 }
 
+/// All of it, empty if there is none.
+template <class Code>
+std::string text_of(const Code& made) {
+  return made ? made->header + made->source + made->settings : std::string();
+}
+
 /// The texts; settings bear a mark of what else is in them.
 inline CCode c_code(const RecordedDesign& design) {
   if (!design.options.settings_in_struct) return c_texts(design, "");
@@ -93,6 +99,9 @@ Expected<CCode, Error<typename Object::scalar_type>> to_c(const Object& object,
                                                           const CodeOptions& options = {}) {
   const auto design = detail::recorded_design(object, options);
   if (!design) return design.error();
+  const auto new_names = detail::new_names<typename Object::scalar_type>(
+      options, [&](const CodeOptions& as) { return detail::text_of(to_c(object, as)); });
+  if (!new_names) return new_names.error();
   return detail::c_code(*design);
 }
 

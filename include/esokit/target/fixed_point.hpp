@@ -274,8 +274,7 @@ class FixedText {
     const bool wraps = d_.wraps();
     const double of_u = options.u.unit / options.y.unit;
     const std::string& name = design_.options.name;
-    std::string upper = name;
-    for (char& c : upper) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+    const std::string upper = begin_of_constants(name);
 
     std::string bounds;
     std::string units;
@@ -621,6 +620,14 @@ Expected<FixedCode, Error<typename Object::scalar_type>> to_fixed_c(
       design.estimates[row].deviation += std::fabs(std::ldexp(c, -scale)) * text.states_of(row);
     }
   }
+  const auto new_names = detail::new_names<V>(options.code, [&](const CodeOptions& as) {
+    FixedPointOptions other = options;
+    other.code = as;
+    other.settings_for = nullptr;
+    const auto code = to_fixed_c(object, other);
+    return detail::text_of(code ? &code->code : nullptr);
+  });
+  if (!new_names) return new_names.error();
   FixedCode made{text.code(), design.estimates, design.input, design.written, design.layout};
   made.layout.mark = text.mark;
   if (given && text.mark != options.settings_for->layout.mark) {
@@ -629,6 +636,12 @@ Expected<FixedCode, Error<typename Object::scalar_type>> to_fixed_c(
                     "ranges, max_gap and signs of its gains"};
   }
   return made;
+}
+
+/// What cannot be written yet, by name.
+template <class Other>
+void to_fixed_c(const Other& object, const FixedPointOptions&) {
+  to_c(object);
 }
 
 }  // namespace esokit

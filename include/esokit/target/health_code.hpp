@@ -51,6 +51,10 @@ requires std::same_as<S, typename Controller::scalar_type> Expected<CCode, Error
   static_assert(std::remove_cvref_t<decltype(controller.observer())>::size == Size,
                 "esokit: Size of the monitor must be the number of states of the observer");
   if (const auto rules = detail::checked_options<S>(options); !rules) return rules.error();
+  const auto new_names = detail::new_names<S>(options, [&](const CodeOptions& as) {
+    return detail::text_of(to_c(monitor, controller, as));
+  });
+  if (!new_names) return new_names.error();
   constexpr bool single = sizeof(S) == sizeof(float);
   detail::RuntimeText text(options.name, single);
   const auto number = [&](const char* name, S x) {
@@ -111,6 +115,9 @@ to_structured_text(const HealthMonitor<Size, S>& monitor, const Controller& cont
                    const CodeOptions& options = {.name = "health"}) {
   const auto code = to_c(monitor, controller, options);
   if (!code) return code.error();
+  const auto new_names = detail::new_names_in_block<S>(
+      options, [&](const CodeOptions& as) { return to_structured_text(monitor, controller, as); });
+  if (!new_names) return new_names.error();
   detail::StBlock block(*code, options, sizeof(S) == sizeof(float), "_clear");
   block.own("sample : $name_sample");
   block.own("flags : UDINT");

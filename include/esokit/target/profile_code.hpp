@@ -39,6 +39,9 @@ template <int Order, PlainScalar S>
 Expected<CCode, Error<S>> to_c(const SmoothProfile<Order, S>& profile,
                                const CodeOptions& options = {}) {
   if (const auto rules = detail::checked_options<S>(options); !rules) return rules.error();
+  const auto new_names = detail::new_names<S>(
+      options, [&](const CodeOptions& as) { return detail::text_of(to_c(profile, as)); });
+  if (!new_names) return new_names.error();
   constexpr bool single = sizeof(S) == sizeof(float);
   const auto number = [](S x) {
     return detail::ListWriter(detail::c_language, single).number(static_cast<double>(x));
@@ -106,6 +109,9 @@ Expected<std::string, Error<S>> to_structured_text(const SmoothProfile<Order, S>
                                                    const CodeOptions& options = {}) {
   const auto code = to_c(profile, options);
   if (!code) return code.error();
+  const auto new_names = detail::new_names_in_block<S>(
+      options, [&](const CodeOptions& as) { return to_structured_text(profile, as); });
+  if (!new_names) return new_names.error();
   detail::StBlock block(*code, options, sizeof(S) == sizeof(float), "_init");
   block.input("target : $real", "of the next move, or where it rests");
   block.input("resets : BOOL", "TRUE: is at rest at target");

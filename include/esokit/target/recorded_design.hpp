@@ -13,6 +13,7 @@
 #include <esokit/target/recorded_numbers.hpp>
 #include <esokit/target/recorder.hpp>
 #include <esokit/target/writable.hpp>
+#include <esokit/target/written_names.hpp>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -25,27 +26,21 @@ namespace detail {
 /// The rules for the options.
 template <class V>
 [[nodiscard]] Rules<V> checked_options(const CodeOptions& options) {
-  const auto letter = [](char c) {
-    return std::isalpha(static_cast<unsigned char>(c)) != 0 || c == '_';
-  };
-  const auto is_identifier = [&](const std::string& name) {
-    bool fine = !name.empty() && letter(name[0]);
-    for (const char c : name) {
-      fine = fine && (letter(c) || std::isdigit(static_cast<unsigned char>(c)) != 0);
-    }
-    return fine;
-  };
-  bool ends = false;
-  for (const char* mark : {"/*", "*/", "(*", "*)"}) {
-    ends = ends || options.comment.find(mark) != std::string::npos;
-  }
   Rules<V> rules;
-  rules.demand(is_identifier(options.name), "name", V(0), "must be an identifier of C")
-      .demand(is_identifier(options.settings_name), "settings_name", V(0),
-              "must be an identifier of C")
+  constexpr const char* identifier =
+      "must be an identifier of C: this is the place of its first wrong character";
+  const int in_name = wrong_place(options.name);
+  const int in_settings = wrong_place(options.settings_name);
+  rules.demand(in_name == 0, "name", static_cast<V>(in_name), identifier)
+      .demand(has_small_letter(options.name), "name", V(0),
+              "must have a small letter: in capitals it begins the constants of another name")
+      .demand(!is_header_of_c(options.name), "name", V(0),
+              "is that of a header of the C library: name.h would be taken for it")
+      .demand(in_settings == 0, "settings_name", static_cast<V>(in_settings), identifier)
       .demand(1 <= options.self_test_samples && options.self_test_samples <= 10000,
               "self_test_samples", static_cast<V>(options.self_test_samples), "must be 1 .. 10000")
-      .demand(!ends, "comment", V(0), "must not begin or end a comment");
+      .demand(!leaves_comment(options.comment), "comment", V(0),
+              "must not begin or end a comment, nor a line of it with a backslash");
   return rules;
 }
 

@@ -14,16 +14,20 @@ namespace esokit {
 /// How a text of another language is to be written.
 struct CodeOptions {
   [[no_unique_address]] ByName<CodeOptions> by_name{};  ///< nothing to set, see ByName
-  std::string name = "controller";  ///< begins every name and the files: an identifier of C
-  std::string comment{};            ///< at the head: which machine, which design; no marks of a
-                                    ///< comment
-  int self_test_samples = 100;      ///< samples of the self-test, 1 .. 10000
+  std::string name = "controller";  ///< begins every name and the files: an identifier of C with a
+                                    ///< small letter, none of a header of C (`math`); in Structured
+                                    ///< Text none of its words. Its capitals begin the constants,
+                                    ///< of a name with capitals itself
+  std::string comment{};        ///< at the head: which machine, which design; no marks of a
+                                ///< comment, no backslash at the end of a line
+  int self_test_samples = 100;  ///< samples of the self-test, 1 .. 10000
   bool watched = false;  ///< keeps what a HealthMonitor looks at: innovation, and u that was asked
 
   /// Gains, those of the law, and limits in a struct that can be changed while it runs, instead of
   /// constants: in C, for gains that do not depend on the innovation or the time.
   bool settings_in_struct = false;
   std::string settings_name = "design";  ///< of that struct, behind `name`: an identifier
+                                         ///< that is not there yet, as `name_update` is
 };
 
 namespace detail {

@@ -6,6 +6,7 @@
 #include <cctype>
 #include <cstddef>
 #include <esokit/core/language.hpp>
+#include <esokit/target/written_names.hpp>
 #include <initializer_list>
 #include <map>
 #include <set>
@@ -34,9 +35,7 @@ inline constexpr const char* head =
 class RuntimeText {
  public:
   RuntimeText(const std::string& name, bool single) : single_(single), name_(name) {
-    for (const char c : name) {
-      upper_ += static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
-    }
+    upper_ = begin_of_constants(name);
     word("real", single ? "float" : "double");
     word("DESIGN_HEADER", "\"" + name + ".h\"");
     feature("ESOKIT_SINGLE", single);

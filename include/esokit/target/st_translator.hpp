@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdlib>
 #include <esokit/target/list_writer.hpp>
+#include <esokit/target/written_names.hpp>
 #include <map>
 #include <set>
 #include <string>
@@ -68,16 +69,8 @@ class StTranslator {
   }
 
   /// Words of Structured Text may not be names. @param word in any case
-  [[nodiscard]] static bool is_taken(std::string word) {
-    static const std::string taken =
-        " and any array at by byte case concat const constant cos date delete dint div do dt dword "
-        "else elsif end eq exit exp expt false find for from function ge gt if insert int le left "
-        "len limit lint ln log lreal lt lword max mid min mod move mul mux ne not of on or program "
-        "read real repeat replace retain return right rol ror sel shl shr sin sint sqrt step "
-        "string struct sub tan task then time to tod true trunc type udint uint until usint var "
-        "while with word wstring xor abs add ";
-    for (char& c : word) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-    return taken.find(" " + word + " ") != std::string::npos;
+  [[nodiscard]] static bool is_taken(const std::string& word) {
+    return is_word_of_structured_text(word);
   }
   /// A number of C.
   [[nodiscard]] static std::string number(std::string text) {

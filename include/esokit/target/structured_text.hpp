@@ -89,13 +89,10 @@ struct StructuredText {
   std::string text{};
   std::string settings{};  ///< a function, with settings_in_struct
   std::string error{};
-  bool is_named = true;  ///< as the language allows
 
   template <class V>
   [[nodiscard]] Expected<std::string, Error<V>> expected(const std::string& which) const {
     Rules<V> rules;
-    rules.demand(is_named, "name", V(0),
-                 "must be no word of Structured Text, without two _ or one at its end");
     rules.demand(error.empty(), "structured_text", V(0),
                  "cannot be written: its C has what is not translated (a defect of esokit)");
     if (!rules) return rules.error();
@@ -139,10 +136,7 @@ class StBlock {
                    first_ + body + "END_FUNCTION_BLOCK\n",
                words_);
     translator.write_for(block);
-    const std::string& name = words_[0].second;
-    const bool is_named =
-        !StTranslator::is_taken(name) && name.back() != '_' && name.find("__") == std::string::npos;
-    return {filled(head, words_) + translator.text() + block, {}, translator.error, is_named};
+    return {filled(head, words_) + translator.text() + block, {}, translator.error};
   }
 
  private:
@@ -276,8 +270,17 @@ Expected<std::string, Error<typename Object::scalar_type>> to_structured_text(
     const Object& object, const CodeOptions& options = {}) {
   const auto design = detail::recorded_design(object, options);
   if (!design) return design.error();
+  const auto new_names = detail::new_names_in_block<typename Object::scalar_type>(
+      options, [&](const CodeOptions& as) { return to_structured_text(object, as); });
+  if (!new_names) return new_names.error();
   const detail::StructuredText all = detail::structured_text(*design);
   return all.template expected<typename Object::scalar_type>(all.text);
+}
+
+/// What cannot be written yet, by name.
+template <class Other>
+void to_structured_text(const Other& object, const CodeOptions& = {}) {
+  to_c(object);
 }
 
 /// With CodeOptions::settings_in_struct: the settings of another design of the same structure, as a
@@ -286,6 +289,8 @@ Expected<std::string, Error<typename Object::scalar_type>> to_structured_text(
 template <detail::Writable Object>
 Expected<std::string, Error<typename Object::scalar_type>> to_structured_settings(
     const Object& object, const CodeOptions& options) {
+  // Of the block, in whose text the names have to be new.
+  if (const auto ok = to_structured_text(object, options); !ok) return ok.error();
   const auto design = detail::recorded_design(object, options);
   if (!design) return design.error();
   const detail::StructuredText all = detail::structured_text(*design);
