@@ -214,6 +214,7 @@
 #include <esokit/target/st_translator.hpp>
 #include <esokit/target/structured_text.hpp>
 #include <esokit/target/writable.hpp>
+#include <esokit/target/written_names.hpp>
 #include <esokit/tune/controller.hpp>
 #include <esokit/tune/controller_source.hpp>
 #include <esokit/tune/families.hpp>

@@ -245,8 +245,8 @@ class CDesign {
     text_.lines("DESIGN_GET_X", each(design_.size, [&](int i) {
                   return "  " + at("x", i) + " = " + state(i) + ";\n";
                 }));
-    text_.word("DESIGN_X", listed(design_.size, [](int i) { return at("x", i); }));
-    text_.word("DESIGN_D", listed(guard.levels, [](int i) { return at("d", i); }));
+    text_.replace("DESIGN_X", listed(design_.size, [](int i) { return at("x", i); }));
+    text_.replace("DESIGN_D", listed(guard.levels, [](int i) { return at("d", i); }));
   }
   void set_measured() {
     const MeasuredNumbers& measured = design_.measured;
@@ -254,9 +254,9 @@ class CDesign {
     for (const auto& path : measured.paths) most = (std::max)(most, path.memory.size());
     const int count = static_cast<int>(measured.paths.size());
     const auto of_paths = [&](const char* name, const auto& of) {
-      text_.word(name, listed(count, [&](int i) {
-                   return of(measured.paths[static_cast<std::size_t>(i)]);
-                 }));
+      text_.replace(name, listed(count, [&](int i) {
+                      return of(measured.paths[static_cast<std::size_t>(i)]);
+                    }));
     };
     const auto pair = [&](const std::array<double, 2>& two) {
       return "{" + writer_.number(two[0]) + ", " + writer_.number(two[1]) + "}";
@@ -288,15 +288,15 @@ class CDesign {
     text_.lines("DESIGN_PUBLISHED", by_row("    ", [](const std::string& row) {
                   return "x = o->published_" + row + ";";
                 }));
-    text_.word("DESIGN_ALL_ESTIMATES", listed(design_.size, [](int i) {
-                 return "estimate_at(o, " + std::to_string(i) + "u)";
-               }));
+    text_.replace("DESIGN_ALL_ESTIMATES", listed(design_.size, [](int i) {
+                    return "estimate_at(o, " + std::to_string(i) + "u)";
+                  }));
     if (design_.gap_gains.empty()) return;
     const auto gains = static_cast<int>(design_.gap_gains[0].size());
     text_.constant("GAINS", std::to_string(gains));
     const std::string row =
         design_.options.settings_in_struct ? "o->settings->gains[row][" : "gains[row][";
-    text_.word("DESIGN_K", listed(gains, [&](int i) { return row + std::to_string(i) + "]"; }));
+    text_.replace("DESIGN_K", listed(gains, [&](int i) { return row + std::to_string(i) + "]"; }));
     text_.lines("DESIGN_GAINS", gain_rows());
   }
 
@@ -422,18 +422,19 @@ class CDesign {
     }
     text_.lines("DESIGN_ABOUT", about + ".\n");
     const std::string calls = c_library_calls(d);
-    text_.word("DESIGN_EXACTLY", d.known.on && !calls.empty()
-                                     ? "bit for bit,\n * where the C library has the same " + calls
-                                     : "bit for bit");
-    text_.word("DESIGN_Y", d.first_state);
-    text_.word("DESIGN_ANGLE", d.wrap.angle);
-    text_.word("esokit_DESIGN_SET", options.name + "_" + options.settings_name);
-    text_.word("DESIGN_REFERENCE",
-               d.compensates ? "the u0 of the controller that is helped" : "the reference");
-    text_.word("DESIGN_LAST", std::to_string(d.size - 1));
-    text_.word("DESIGN_COLUMNS", d.predictive      ? "y, next r, u"
-                                 : d.is_controller ? "y, r, u"
-                                                   : "y, u, the disturbance");
+    text_.replace("DESIGN_EXACTLY",
+                  d.known.on && !calls.empty()
+                      ? "bit for bit,\n * where the C library has the same " + calls
+                      : "bit for bit");
+    text_.replace("DESIGN_Y", d.first_state);
+    text_.replace("DESIGN_ANGLE", d.wrap.angle);
+    text_.replace("esokit_DESIGN_SET", options.name + "_" + options.settings_name);
+    text_.replace("DESIGN_REFERENCE",
+                  d.compensates ? "the u0 of the controller that is helped" : "the reference");
+    text_.replace("DESIGN_LAST", std::to_string(d.size - 1));
+    text_.replace("DESIGN_COLUMNS", d.predictive      ? "y, next r, u"
+                                    : d.is_controller ? "y, r, u"
+                                                      : "y, u, the disturbance");
     std::string vectors;
     for (const auto& [y, r, result] : d.samples) {
       vectors += "    {" + writer_.number(y) + ", " + writer_.number(r) + ", " +

@@ -98,9 +98,9 @@ requires std::same_as<S, typename Controller::scalar_type> Expected<CCode, Error
   limit("ONE_SIDE", 0.8);
   text.count("SIZE", Size);
   text.count("DIVIDER", static_cast<std::size_t>(settings.divider));
-  text.word("DESIGN_MEMORY",
-            std::to_string(static_cast<long long>(S(1) / settings.weight + S(0.5))));
-  text.word("DESIGN_ROW", std::to_string(Controller::order));
+  text.replace("DESIGN_MEMORY",
+               std::to_string(static_cast<long long>(S(1) / settings.weight + S(0.5))));
+  text.replace("DESIGN_ROW", std::to_string(Controller::order));
   text.lines("DESIGN_ABOUT", options.comment.empty() ? "" : " * " + options.comment + "\n");
   return CCode{text.header(detail::runtime::health_header),
                text.source(text.part(detail::runtime::health)),

@@ -92,7 +92,7 @@ Expected<CCode, Error<S>> to_c(const SmoothProfile<Order, S>& profile,
   text.constant("SHORTEST_TIME", number(numbers.shortest_time));
   text.constant("LONGER", number(numbers.longer));
   text.constant("MOST_SAMPLES", number(static_cast<S>(1 << 30)));
-  text.word("DESIGN_ROOTS", Order > 2 ? "sqrt and cbrt" : "sqrt");
+  text.replace("DESIGN_ROOTS", Order > 2 ? "sqrt and cbrt" : "sqrt");
   text.lines("DESIGN_ABOUT", options.comment.empty() ? "" : " * " + options.comment + "\n");
   text.lines("DESIGN_POLYNOMIALS", polynomials);
   text.lines("DESIGN_VECTORS", vectors);

@@ -36,18 +36,18 @@ class RuntimeText {
  public:
   RuntimeText(const std::string& name, bool single) : single_(single), name_(name) {
     upper_ = begin_of_constants(name);
-    word("real", single ? "float" : "double");
-    word("DESIGN_HEADER", "\"" + name + ".h\"");
+    replace("real", single ? "float" : "double");
+    replace("DESIGN_HEADER", "\"" + name + ".h\"");
     feature("ESOKIT_SINGLE", single);
     for (const char* one : {"fabs", "round", "sqrt", "ceil", "cbrt"}) {
-      if (single) word(one, std::string(one) + "f");
+      if (single) replace(one, std::string(one) + "f");
     }
   }
 
   void feature(const std::string& name, bool on) {
     if (on) features_.insert(name);
   }
-  void word(const std::string& name, const std::string& text) { words_[name] = text; }
+  void replace(const std::string& name, const std::string& text) { words_[name] = text; }
   /// @param text each line with its end
   void lines(const std::string& name, const std::string& text) { lines_[name] = text; }
   void constant(const std::string& name, const std::string& value) {
@@ -74,7 +74,7 @@ class RuntimeText {
   /// A header: constants are in place.
   [[nodiscard]] std::string header(std::string_view file) {
     RuntimeText placed = *this;
-    for (const auto& [name, value] : constants_) placed.word(name, value);
+    for (const auto& [name, value] : constants_) placed.replace(name, value);
     return placed.part(file);
   }
   /// A source: a head with the constants that the rest uses, and the rest.
@@ -104,7 +104,7 @@ class RuntimeText {
         text += found->second;
       } else if (begins(line, "#define ") && std::islower(static_cast<unsigned char>(line[8]))) {
         const std::size_t blank = line.find(' ', 8);
-        word(std::string(line.substr(8, blank - 8)), std::string(line.substr(blank + 1)));
+        replace(std::string(line.substr(8, blank - 8)), std::string(line.substr(blank + 1)));
       } else {
         text += named(line) + "\n";
       }
@@ -171,7 +171,7 @@ class RuntimeText {
         do ++end;
         while (end < line.size() && is_digit(line[end]));
       }
-      const std::string word(line.substr(at, end - at));
+      const std::string word = std::string(line.substr(at, end - at));
       const bool has_point = word.find('.') != std::string::npos;
       out += is_number ? word + (has_point && single_ ? "f" : "") : named_word(word);
       at = end;
