@@ -10,8 +10,10 @@
 /// gains give the margins. (d is a random walk, so the variance of u is infinite, but that of u~ is
 /// not.) The grid is even in the logarithm of W = 2 / T tan(omega T / 2), on which the trapezoid
 /// rule converges exponentially: with poles of damping 0.25 the error is 1e-6 at 20 points per
-/// decade. A loop is stable if the phase of its characteristic polynomial turns by half a turn for
-/// each state between z = 1 and z = -1.
+/// decade. Its steps grow towards half the sample rate, where W is infinite, so that it sees poles
+/// near z = -1. Poles of little damping hide between its points: `exact_deviations` solves the
+/// Lyapunov equations. A loop is stable if the phase of its characteristic polynomial turns by half
+/// a turn for each state between z = 1 and z = -1.
 ///
 /// A latency that is wrong by part of a sample is more than a phase: near half the sample rate a
 /// sampled plant of one dead time can have next to no gain, and that of half a sample more a lot.
@@ -23,6 +25,7 @@
 #include <cmath>
 #include <complex>
 #include <cstddef>
+#include <esokit/analysis/covariance.hpp>
 #include <esokit/analysis/delay_margin.hpp>
 #include <esokit/analysis/linear_controller.hpp>
 #include <esokit/analysis/poles.hpp>
@@ -142,7 +145,7 @@ class FastResponse {
 /// The response of a sampled plant is a sum over the frequencies that the samples do not tell from
 /// each other. A dead time turns each of them at its own rate.
 struct Aliases {
-  static constexpr int most_cells = 8;
+  static constexpr int most_cells = 16;
   std::complex<double> base;  ///< response at the frequency itself
   double size = 0.0;          ///< its magnitude
   double rest = 0.0;          ///< sum of the magnitudes at the others
@@ -171,10 +174,11 @@ inline Aliases aliases(const TuneModel& model, double gain, double w, double ran
   found.base = parts[most];
   found.size = (std::abs)(found.base);
   if (range >= 0.5 * T) return found;
-  // A cell is short enough for a straight line: at most 0.4 rad of the frequency itself, and where
-  // the others count, an eighth of a turn of the nearest two.
+  // A cell is short enough for a straight line: at most 0.2 rad of the frequency itself, which is
+  // half a percent of its size, and where the others count, a sixteenth of a turn of the nearest
+  // two.
   found.cells =
-      found.rest < 0.02 * found.size ? 1 + static_cast<int>(5.0 * w * range) : Aliases::most_cells;
+      found.rest < 0.02 * found.size ? 1 + static_cast<int>(10.0 * w * range) : Aliases::most_cells;
   for (int cell = 0; cell <= found.cells; ++cell) {
     const double late = (2.0 * cell / found.cells - 1.0) * range;
     for (int k = -most; k <= most; ++k) {
@@ -198,6 +202,12 @@ class LoopCost {
       : T_(model.sample_time), b0_(model.input_gain.value), factor_(rules.gain_factor) {
     std::vector<detail::SampledPlant> others;
     const auto variants = detail::plant_variants(model);
+    const double share = model.input_gain.half_width / (std::abs)(model.input_gain.value);
+    spread_[0] = {1.0 - share, 1.0 + share};
+    for (std::size_t v = 0; v < (std::min)(variants.size(), most_variants); ++v) {
+      // From this end of the interval of b0 to the other one.
+      spread_[v + 1] = {(1.0 - share) / variants[v].gain, (1.0 + share) / variants[v].gain};
+    }
     for (const auto& variant : variants) {
       others.push_back(detail::sampled_plant(detail::dense_plant(variant.model, variant.gain),
                                              model.sample_time));
@@ -239,15 +249,19 @@ class LoopCost {
       p.load_power = density * model.disturbance * T_ / std::norm(value) + load;
       points_.push_back(p);
     };
-    const double from = 1e-2 * slowest;
-    const double to = 60.0 / T_;
-    const int steps = static_cast<int>(std::ceil(points * std::log10(to / from)));
-    const double h = std::log(to / from) / steps;
+    // Over v, log x = v + e^(v - last) - e^(first - v), x = W T / 2: even between first and last,
+    // and with steps that grow beyond, to z + 1 = 2e-6.
+    const double first = std::log(0.15 * slowest * T_), last = std::log(10.0);
+    const double from = first - 1.0, to = last + 2.25;
+    const int steps = static_cast<int>(std::ceil(points * (to - from) / std::log(10.0)));
+    const double h = (to - from) / steps;
     for (int i = 0; i <= steps; ++i) {
-      const double W = from * std::exp(h * i);
-      const double x = 0.5 * W * T_;
+      const double v = from + h * i;
+      const double after = std::exp(v - last), before = std::exp(first - v);
+      const double x = std::exp(v + after - before);
+      const double step = h * (1.0 + after + before);
       // Beyond the ends the densities are constant.
-      const double ends = i == 0 ? 0.5 * h + 1.0 : i == steps ? 0.5 * h + 1.0 : h;
+      const double ends = i == 0 || i == steps ? 0.5 * step + 1.0 : step;
       add(2.0 / T_ * std::atan(x), ends * 2.0 * x / (1.0 + x * x) / std::numbers::pi, 0.0);
     }
     add(std::numbers::pi / T_, 0.0, 0.0);
@@ -298,9 +312,9 @@ class LoopCost {
         }
       }
       const double size = std::sqrt(std::norm(c.gain));
-      margins(numbers, trails[0], loop, p.aliases[0], c.gain, size, i);
-      for (std::size_t v = 0; v < variants_; ++v) {
-        margins(numbers, trails[v + 1], p.ratio[v] * loop, p.aliases[v + 1], c.gain, size, i);
+      for (std::size_t v = 0; v <= variants_; ++v) {
+        margins(numbers, trails[v], v == 0 ? loop : p.ratio[v - 1] * loop, p.aliases[v], spread_[v],
+                c.gain, size, i);
       }
     }
     const double whole = std::numbers::pi * (plant_states_ + controller.states());
@@ -320,6 +334,11 @@ class LoopCost {
  private:
   static constexpr std::size_t most_variants = 4;
 
+  /// Factors on a gain to both ends of its interval.
+  struct Spread {
+    double low = 1.0, high = 1.0;
+  };
+
   struct Point {
     double frequency;
     ComplexNumber value, plant, load, turn;
@@ -336,28 +355,42 @@ class LoopCost {
     ComplexNumber loop{}, largest{};
   };
 
-  /// @param gain of the controller @param size its magnitude
+  /// Square of the distance of -1 from the straight line between 1 + L of two loops.
+  static double nearest(ComplexNumber from, ComplexNumber to) {
+    const ComplexNumber step = to - from;
+    const double along = -(from.real() * step.real() + from.imag() * step.imag());
+    const double length = std::norm(step);
+    if (along <= 0.0) return std::norm(from);
+    if (along >= length) return std::norm(to);
+    return (std::max)(std::norm(from) - along * along / length, 0.0);
+  }
+
+  /// @param spread factors on the gain to the ends of its interval @param gain of the controller
+  /// @param size its magnitude
   void margins(LoopNumbers& numbers, Trail& trail, ComplexNumber loop,
-               const detail::Aliases& aliases, ComplexNumber gain, double size,
-               std::size_t i) const {
+               const detail::Aliases& aliases, const Spread& spread, ComplexNumber gain,
+               double size, std::size_t i) const {
     const Point& p = points_[i];
     const double base = size * aliases.size, rest = size * aliases.rest;
     double now = std::norm(1.0 + loop);
     // Where L is large nothing is near to -1, and that is half of all frequencies.
-    if (range_ > 0.0 ? base - rest < 5.0 : now < 16.0) {
+    if (range_ > 0.0 ? spread.low * (base - rest) < 5.0 : now < 16.0) {
+      // As near to -1 as a gain of its interval brings it.
+      if (spread.low < spread.high) {
+        now = (std::min)(now, nearest(1.0 + spread.low * loop, 1.0 + spread.high * loop));
+      }
       // As near to -1 as a latency of the range brings it.
       if (range_ > 0.0 && aliases.cells > 0) {
         ComplexNumber from = 1.0 - gain * aliases.sums[0];
         for (int cell = 1; cell <= aliases.cells; ++cell) {
           const ComplexNumber to = 1.0 - gain * aliases.sums[cell];
-          const ComplexNumber step = to - from;
-          const double share = -(from.real() * step.real() + from.imag() * step.imag());
-          const double length = std::norm(step);
-          now = (std::min)(now, share <= 0.0 ? std::norm(from)
-                                : share >= length
-                                    ? std::norm(to)
-                                    : (std::max)(std::norm(from) - share * share / length, 0.0));
+          now = (std::min)(now, nearest(from, to));
           from = to;
+        }
+        // At the latencies at both ends, every gain.
+        for (const int cell : {0, aliases.cells}) {
+          const ComplexNumber l = -gain * aliases.sums[cell];
+          now = (std::min)(now, nearest(1.0 + spread.low * l, 1.0 + spread.high * l));
         }
       } else if (range_ > 0.0) {
         const ComplexNumber middle = aliases.base * gain;
@@ -386,6 +419,10 @@ class LoopCost {
     };
     const ComplexNumber largest = -(1.0 + aliases.rest / aliases.size) * aliases.base * gain;
     const double b = std::norm(largest);
+    // With another gain of the interval it is here that abs(L) is one.
+    if (i < walked_ && spread.low * spread.low * b < 1.0 && 1.0 < spread.high * spread.high * b) {
+      delay(largest, p.frequency);
+    }
     if (i > 0) {
       const double a = std::norm(trail.largest);
       if ((a < 1.0) != (b < 1.0)) {
@@ -408,9 +445,69 @@ class LoopCost {
   double factor_;
   double range_ = 0.0;  ///< of latencies, either way from the middle one, s
   std::size_t variants_ = 0;
+  Spread spread_[most_variants + 1];  ///< of the model, then of its variants
   int plant_states_ = 0;
   std::size_t walked_ = 0;
   std::vector<Point> points_;
 };
+
+/// The standard deviations of a stable loop of the model and a controller with integral action in
+/// closed form, by Lyapunov equations; left as they are if these cannot be solved to 1e-11.
+inline void exact_deviations(const TuneModel& model, const Loop& loop, LoopNumbers& numbers) {
+  const DynamicSystem& closed = loop.system();
+  const int n = closed.a.rows();
+  DynamicSystem system{closed.a, closed.b, DynamicMatrix<double>(2, n),
+                       DynamicMatrix<double>(2, closed.b.cols()), closed.sample_time};
+  for (int i = 0; i < 2; ++i) {
+    for (int j = 0; j < n; ++j) system.c(i, j) = closed.c(i, j);
+    for (int j = 0; j < closed.b.cols(); ++j) system.d(i, j) = closed.d(i, j);
+  }
+  const double b0 = model.input_gain.value;
+  double output = 0.0, control = 0.0;
+  for (const KnownSinusoid& sinusoid : model.sinusoids) {
+    const auto g = detail::evaluate(
+        system, detail::frequency_operator(sinusoid.frequency, system.sample_time));
+    const double half = 0.5 * sinusoid.amplitude * sinusoid.amplitude;
+    output += half * std::norm(g(0, 2));
+    control += half * std::norm(1.0 / b0 + g(1, 2));
+  }
+  // A state stands at s1 d for a constant d; its distance from there is driven by -s1 times the
+  // increments of d.
+  DynamicMatrix<double> left = system.a, stand(n, 1);
+  for (int i = 0; i < n; ++i) stand(i, 0) = -system.b(i, 2);
+  detail::solve_in_place(left.view(), stand.view());
+  for (int i = 0; i < n; ++i) system.b(i, 2) = -stand(i, 0);
+  DynamicMatrix<double> input(system.b.cols(), system.b.cols());
+  input(1, 1) = model.noise * model.noise;
+  const auto noise = output_covariance(system, input);
+  input(1, 1) = 0.0;
+  input(2, 2) = model.disturbance * model.sample_time;
+  const auto walk = output_covariance(system, input);
+  if (noise) numbers.control_noise = std::sqrt((*noise)(1, 1));
+  if (!noise || !walk) return;
+  numbers.output = std::sqrt((*noise)(0, 0) + (*walk)(0, 0) + output);
+  numbers.control = std::sqrt((*noise)(1, 1) + (*walk)(1, 1) + control);
+}
+
+/// The smallest damping of the poles of a sampled loop, -Re(s) / abs(s) for z = e^(s T).
+/// @param known rad/s: the two poles nearest to this frequency do not count; 0: all count
+inline double pole_damping(const Loop& loop, double known = 0.0) {
+  std::vector<std::complex<double>> poles;
+  for (const auto& pole : loop.poles())
+    poles.emplace_back(1.0 + pole.real(), (std::abs)(pole.imag()));
+  if (known > 0.0) {
+    const auto at = std::polar(1.0, known * loop.sample_time());
+    std::sort(poles.begin(), poles.end(),
+              [&](const auto& a, const auto& b) { return std::norm(a - at) > std::norm(b - at); });
+    poles.resize(poles.size() - std::min<std::size_t>(poles.size(), 2));
+  }
+  double least = 1.0;
+  for (const auto& pole : poles) {
+    if (std::norm(pole) < 1e-12) continue;
+    const auto s = std::log(pole);
+    least = (std::min)(least, -s.real() / (std::abs)(s));
+  }
+  return least;
+}
 
 }  // namespace esokit

@@ -152,16 +152,19 @@ struct RivalSearch {
     for (std::size_t i = 0; i < x.size(); ++i)
       outside += (std::max)(low[i] - x[i], 0.0) + (std::max)(x[i] - high[i], 0.0);
     if (outside > 0.0) return 1e4 * (1.0 + outside);
-    const LoopNumbers numbers = (*cost)(closed_upon_itself(pid_form(settings(kind, x))));
+    const PlainPidConfig pid = settings(kind, x);
+    const LoopNumbers numbers = (*cost)(closed_upon_itself(pid_form(pid)));
     const double j = numbers.cost(search.rho, tuning->model.input_gain.value);
     if (!numbers.stable || !(j > 0.0) || !is_finite(j)) return 1e4;
-    return std::log(j) + price * TuneSearch::lack(search.kept(numbers), 1.004);
+    const double poles = search.damped ? search.damping_of(pid_form(pid), false) : TuneSearch::any;
+    return std::log(j) + price * TuneSearch::lack(search.kept(numbers, poles), 1.004);
   }
 
   /// What it lacks of the rules.
   [[nodiscard]] double lack(RivalKind kind, const std::vector<double>& x) const {
-    return TuneSearch::lack(search.kept((*cost)(closed_upon_itself(pid_form(settings(kind, x))))),
-                            0.9995);
+    const LinearController form = pid_form(settings(kind, x));
+    return TuneSearch::lack(
+        search.kept((*cost)(closed_upon_itself(form)), search.damping_of(form, false)), 0.9995);
   }
 
   /// The PID with a filter of second order that equals a controller of three states; none if its
@@ -318,7 +321,10 @@ inline void judge(TunedRival& rival, const TuneSearch& search, const LoopCost& f
   formed(rival.pid.reference_weight, times[0]);
   const LoopNumbers numbers = fine(closed_upon_itself(d.controller));
   const auto filled = [&] {
-    fill_in_loop(d, search, numbers, search.kept(numbers), optimum, free_cost);
+    fill_in_loop(
+        d, search, numbers,
+        [&](const LoopNumbers& by, double poles) { return search.kept(by, poles); }, optimum,
+        free_cost);
   };
   filled();
   if (numbers.stable && chosen) {
@@ -376,8 +382,9 @@ template <class = void>
       again.push_back(free.at);
       best = of.least(kind, true, again);
     }
-    // What the coarse grid took for enough, and is not.
+    // What the coarse grid took for enough, and is not; and poles that ring.
     of.cost = &of.fine;
+    of.search.damped = true;
     if (of.lack(kind, best.at) > 0.0) best = of.least(kind, true, {best.at});
     // Never worse than what is known to be one of these.
     if (kind == RivalKind::freely_filtered) {
@@ -390,6 +397,7 @@ template <class = void>
       }
     }
     of.cost = &of.coarse;
+    of.search.damped = false;
     known.push_back(best.at);
     TunedRival rival;
     rival.kind = kind;

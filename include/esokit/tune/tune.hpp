@@ -53,21 +53,35 @@ struct StepAnswer {
   double peak = 0.0;
   double settling = 0.0;
 };
+/// @param horizon samples to follow it; the first 50000 one by one, then in steps that double
 inline StepAnswer step_answer(const DynamicSystem& system, int input, double size, double final,
-                              int steps) {
+                              double horizon) {
   const int n = system.a.rows();
-  std::vector<double> x(static_cast<std::size_t>(n)), rate(static_cast<std::size_t>(n));
+  // The states and the constant input.
+  DynamicMatrix<double> rates(n + 1, n + 1);
+  add(rates, 0, 0, system.a);
+  for (int i = 0; i < n; ++i) rates(i, n) = system.b(i, input) * size;
+  std::vector<double> x(static_cast<std::size_t>(n) + 1), rate(x.size());
+  x.back() = 1.0;
   StepAnswer answer;
-  for (int k = 0; k <= steps; ++k) {
+  double stride = 1.0;
+  for (double k = 0.0, until = 5e4; k <= horizon; k += stride) {
+    if (k >= until) {
+      const auto square = product(rates, rates);
+      add(rates, 0, 0, rates);
+      add(rates, 0, 0, square);
+      stride *= 2.0;
+      until *= 2.0;
+    }
     double y = system.d(0, input) * size;
     for (int j = 0; j < n; ++j) y += system.c(0, j) * x[static_cast<std::size_t>(j)];
     answer.peak = (std::max)(answer.peak, (std::abs)(y));
     if ((std::abs)(y - final) > 0.02 * (std::abs)(final))
-      answer.settling = (k + 1) * system.sample_time;
-    for (int i = 0; i < n; ++i) rate[static_cast<std::size_t>(i)] = system.b(i, input) * size;
-    for (int j = 0; j < n; ++j) {
+      answer.settling = (k + stride) * system.sample_time;
+    std::fill(rate.begin(), rate.end(), 0.0);
+    for (int j = 0; j <= n; ++j) {
       const double value = x[static_cast<std::size_t>(j)];
-      for (int i = 0; i < n; ++i) rate[static_cast<std::size_t>(i)] += system.a(i, j) * value;
+      for (int i = 0; i < n; ++i) rate[static_cast<std::size_t>(i)] += rates(i, j) * value;
     }
     for (std::size_t i = 0; i < x.size(); ++i) x[i] += rate[i];
   }
@@ -144,10 +158,19 @@ inline void play_all(TunedDesign& d, const TuneModel& model) {
   play_law(d, model);
 }
 
-/// What the loop of a design does, and the rule that limits it. @param kept by `numbers`
-inline void fill_in_loop(TunedDesign& d, const TuneSearch& search, const LoopNumbers& numbers,
-                         const TuneSearch::Kept& kept, double optimum, double free_cost) {
+/// What the loop of a design does, and the rule that limits it.
+/// @param kept what it keeps of the rules, from its LoopNumbers and the damping of its poles
+template <class Kept>
+void fill_in_loop(TunedDesign& d, const TuneSearch& search, LoopNumbers numbers,
+                  const Kept& kept_by, double optimum, double free_cost) {
   const TuneModel& model = search.model;
+  const auto loop = closed_loop(model, d.controller);
+  const bool stable = numbers.stable && loop && loop->stable();
+  if (stable) {
+    exact_deviations(model, *loop, numbers);
+    d.pole_damping = search.damping_of(*loop, d.knows.sinusoid);
+  }
+  const TuneSearch::Kept kept = kept_by(numbers, stable ? d.pole_damping : -1.0);
   d.cost = numbers.cost(search.rho, model.input_gain.value);
   d.excess = std::sqrt(d.cost / optimum);
   d.free_excess = (std::min)(std::sqrt(free_cost / optimum), d.excess);
@@ -158,8 +181,9 @@ inline void fill_in_loop(TunedDesign& d, const TuneSearch& search, const LoopNum
   d.delay_margin = numbers.delay;
   d.gain_tolerance = numbers.tolerance;
   d.phase_margin = numbers.phase;
-  d.feasible = numbers.stable && search.lack(kept, 0.999) <= 0.0;
-  if (!numbers.stable) {
+  // Stability is decided by the poles, too.
+  d.feasible = stable && search.lack(kept, 0.999) <= 0.0;
+  if (!stable) {
     d.constraint = "stability";
     return;
   }
@@ -167,27 +191,24 @@ inline void fill_in_loop(TunedDesign& d, const TuneSearch& search, const LoopNum
     d.constraint = "none";
   } else {
     const double gain = numbers.tolerant ? numbers.tolerance / search.rules.gain_factor : kept.gain;
-    const std::pair<double, const char*> all[] = {
-        {gain, "b0 wrong by a factor"},   {kept.modulus, "modulus margin"},
-        {kept.delay, "delay margin"},     {kept.phase, "phase margin"},
-        {kept.noise, "noise in u"},       {kept.damping, "k_1 / k_0 and the latency"},
-        {kept.ratio, "omega_c / omega_o"}};
+    const std::pair<double, const char*> all[] = {{gain, "b0 wrong by a factor"},
+                                                  {kept.modulus, "modulus margin"},
+                                                  {kept.delay, "delay margin"},
+                                                  {kept.phase, "phase margin"},
+                                                  {kept.noise, "noise in u"},
+                                                  {kept.poles, "damping of the poles"},
+                                                  {kept.damping, "k_1 / k_0 and the latency"},
+                                                  {kept.ratio, "omega_c / omega_o"}};
     d.constraint =
         std::min_element(std::begin(all), std::end(all), [](const auto& a, const auto& b) {
           return a.first < b.first;
         })->second;
   }
-  const auto loop = closed_loop(model, d.controller);
-  if (!loop || !loop->stable()) {
-    // Stability is decided by the poles.
-    d.feasible = false;
-    d.constraint = "stability";
-    return;
-  }
   const double decay = -std::log1p((std::max)(loop->stability_abscissa(), -0.9));
-  const int steps = static_cast<int>((std::min)(12.0 / decay, 50000.0)) + 10;
-  d.settling_time = step_answer(loop->system(), 0, 1.0, 1.0, steps).settling;
-  d.load_peak = step_answer(loop->system(), 2, (std::abs)(model.input_gain.value), 0.0, steps).peak;
+  const double horizon = 12.0 / decay + 10.0;
+  d.settling_time = step_answer(loop->system(), 0, 1.0, 1.0, horizon).settling;
+  d.load_peak =
+      step_answer(loop->system(), 2, (std::abs)(model.input_gain.value), 0.0, horizon).peak;
 }
 
 /// Computes the results of a design from its settings.
@@ -205,7 +226,10 @@ inline void fill_in(Contender& c, const TuneSearch& search, const LoopCost& fine
   d.bandwidth_ratio =
       law_mean(gains, model.order) / observer_mean(d.family, c.kind, model, d.settings);
   d.numbers = c.observer_numbers + c.law_numbers;
-  fill_in_loop(d, search, numbers, search.kept(c, d.settings, numbers), optimum, free_cost);
+  fill_in_loop(
+      d, search, numbers,
+      [&](const LoopNumbers& by, double poles) { return search.kept(c, d.settings, by, poles); },
+      optimum, free_cost);
   const auto observer = tuned_observer(c.kind, model.sample_time, d.settings);
   d.law = {gains, observer->input_gain, observer->to_estimate, observer->y_to_estimate};
 }
@@ -374,6 +398,8 @@ template <TuneKnowledge Parts = tune_knows_all>
       .not_negative("phase_margin", rules.phase_margin)
       .demand(!(rules.phase_margin >= 1.5), "phase_margin", rules.phase_margin,
               "must be below 1.5 rad")
+      .not_negative("pole_damping", rules.pole_damping)
+      .demand(!(rules.pole_damping >= 0.7), "pole_damping", rules.pole_damping, "must be below 0.7")
       .not_negative("damping_latencies", rules.damping_latencies)
       .not_negative("bandwidth_ratio", rules.bandwidth_ratio)
       .not_negative("filter_floor", rules.filter_floor.value_or(0.0))
@@ -535,13 +561,18 @@ template <TuneKnowledge Parts = tune_knows_all>
           best = search.least(c, true, starts);
         }
       }
-      // What the coarse grid took for enough, and is not.
-      if (search.lacks(c, best.at, cost) <= 0.0 && search.lacks(c, best.at, fine) > 0.0) {
-        search.seen.clear();
-        search.cost = &fine;
-        best = search.least(c, true, {best.at});
-        search.seen.clear();
-        search.cost = &cost;
+      // What the coarse grid took for enough, and is not; and poles that ring, which few have.
+      if (search.lacks(c, best.at, cost, false) <= 0.0) {
+        const bool too_coarse = search.lacks(c, best.at, fine, false) > 0.0;
+        if (too_coarse || search.lacks(c, best.at, cost, true) > 0.0) {
+          search.seen.clear();
+          search.cost = too_coarse ? &fine : &cost;
+          search.damped = true;
+          best = search.least(c, true, {best.at});
+          search.seen.clear();
+          search.cost = &cost;
+          search.damped = false;
+        }
       }
       c.design.settings = detail::as_printed(search.settings(c, best.at));
       detail::fill_in(c, search, fine, tuning.optimum, std::exp(least_cost));

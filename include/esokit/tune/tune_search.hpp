@@ -41,6 +41,7 @@ struct TuneSearch {
   double possible_bandwidth;   ///< largest one that lag and dead time allow
   double most_noise;           ///< in u, 0 if something else is required
   const LoopCost* cost;
+  bool damped = false;  ///< whether each evaluation looks at the poles of the loop
 
   /// Of a point that was evaluated: log J, what its rules lack, and log omega_c.
   struct Seen {
@@ -135,27 +136,38 @@ struct TuneSearch {
   /// What the rules are about: of each the number that a design has, over the one that is required;
   /// infinite if nothing is.
   struct Kept {
-    double modulus, delay, gain, phase, noise, damping, ratio;
+    double modulus, delay, gain, phase, noise, poles, damping, ratio;
   };
   [[nodiscard]] static double over(double has, double required) {
     return required > 0.0 ? has / required : std::numeric_limits<double>::infinity();
   }
-  /// Those that any controller has to keep.
-  [[nodiscard]] Kept kept(const LoopNumbers& numbers) const {
-    constexpr double any = std::numeric_limits<double>::infinity();
+  static constexpr double any = std::numeric_limits<double>::infinity();
+
+  /// The damping of the poles of a loop, see TuneRules::pole_damping; negative if it is not stable.
+  [[nodiscard]] double damping_of(const Loop& loop, bool knows_sinusoid) const {
+    return pole_damping(loop, knows_sinusoid ? model.sinusoids.front().frequency : 0.0);
+  }
+  [[nodiscard]] double damping_of(const LinearController& controller, bool knows_sinusoid) const {
+    const auto loop = closed_loop(model, controller);
+    return loop ? damping_of(*loop, knows_sinusoid) : -1.0;
+  }
+
+  /// Those that any controller has to keep. @param poles damping of the poles, if it is known
+  [[nodiscard]] Kept kept(const LoopNumbers& numbers, double poles = any) const {
     return {over(numbers.modulus, rules.modulus_margin),
             over(numbers.delay, rules.delay_samples * model.sample_time),
             numbers.tolerant ? (std::max)(numbers.tolerance / rules.gain_factor, 1.0)
                              : (std::min)(numbers.tolerance / rules.gain_factor, 0.98),
             over(numbers.phase, rules.phase_margin),
             most_noise > 0.0 ? most_noise / numbers.control_noise : any,
+            over(poles, rules.pole_damping),
             any,
             any};
   }
-  [[nodiscard]] Kept kept(const Contender& c, const TuneSettings& s,
-                          const LoopNumbers& numbers) const {
+  [[nodiscard]] Kept kept(const Contender& c, const TuneSettings& s, const LoopNumbers& numbers,
+                          double poles = any) const {
     const int n = model.order;
-    Kept all = kept(numbers);
+    Kept all = kept(numbers, poles);
     if (n > 1)
       all.damping = over(s.gains[1] / s.gains[0], rules.damping_latencies * model.lateness());
     if (n == 3 && rules.bandwidth_ratio > 0.0) {
@@ -168,7 +180,7 @@ struct TuneSearch {
   [[nodiscard]] static double lack(const Kept& kept, double more = 1.0) {
     double sum = (std::max)(1.0 - kept.gain, 0.0);
     for (const double share :
-         {kept.modulus, kept.delay, kept.phase, kept.noise, kept.damping, kept.ratio}) {
+         {kept.modulus, kept.delay, kept.phase, kept.noise, kept.poles, kept.damping, kept.ratio}) {
       sum += (std::max)(1.0 - share / more, 0.0);
     }
     return sum;
@@ -198,7 +210,8 @@ struct TuneSearch {
     } else {
       // Behind limits a slow law comes back more often, except of one integrator.
       const auto& k = chosen.gains;
-      found = {std::log(j), lack(kept(c, chosen, numbers), 1.004),
+      const double poles = damped ? damping_of(*controller, c.design.knows.sinusoid) : any;
+      found = {std::log(j), lack(kept(c, chosen, numbers, poles), 1.004),
                model.order == 1 ? std::log(k[0]) / static_cast<double>(k.size()) : 0.0};
     }
     return found.value + price * found.lack - worth_of_speed * found.speed;
@@ -212,12 +225,14 @@ struct TuneSearch {
                        [](const auto& pole) { return (std::abs)(1.0 + pole) > 1.0 + 1e-7; });
   }
 
-  /// What a point lacks of the rules, by this cost.
-  [[nodiscard]] double lacks(const Contender& c, const std::vector<double>& x,
-                             const LoopCost& by) const {
+  /// What a point lacks of the rules, by this cost. @param whole with the poles of the loop
+  [[nodiscard]] double lacks(const Contender& c, const std::vector<double>& x, const LoopCost& by,
+                             bool whole) const {
     const TuneSettings chosen = settings(c, x);
     const auto controller = tuned_controller(c.kind, model.sample_time, chosen);
-    return controller ? lack(kept(c, chosen, by(*controller)), 0.9995) : 1e5;
+    if (!controller) return 1e5;
+    const double poles = whole ? damping_of(*controller, c.design.knows.sinusoid) : any;
+    return lack(kept(c, chosen, by(*controller), poles), 0.9995);
   }
 
   /// Whether variable `index` of the search is a damping; the others are factors or bandwidths.

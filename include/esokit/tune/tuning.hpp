@@ -43,6 +43,7 @@ struct TunedDesign {
   double gain_tolerance = 0.0;     ///< factor by which b0 may be wrong in either direction
   double delay_margin = 0.0;       ///< smallest over the intervals, s
   double phase_margin = 0.0;       ///< smallest over the intervals, rad
+  double pole_damping = 0.0;       ///< smallest damping of the poles, see TuneRules
   double damping_latencies = 0.0;  ///< k_1 / k_0 over TuneModel::latency, 0 if there is no k_1
   double bandwidth_ratio = 0.0;    ///< omega_c / omega_o, geometric means of poles
   int operations = 0;              ///< per update of the observer, see update_operations
