@@ -31,7 +31,8 @@ inline constexpr bool takes_names_only = false;
 /// @tparam Config the struct itself, so that no two at one address are of one type
 template <class Config>
 struct ByName {
-  constexpr ByName() = default;
+  // Not = default: Clang 16 would clear a byte for it, in which another member lies.
+  constexpr ByName() noexcept {}
   /// Does not compile.
   template <class... Values>
   requires(sizeof...(Values) > 0 &&
