@@ -159,8 +159,10 @@ std::vector<Row> rows_of(const Tuning& tuning, const std::vector<TunedRival>& ri
         };
       };
     };
-    const auto made = model.order == 1 ? with_controller<1>(model, d, visit)
-                                       : with_controller<2>(model, d, visit);
+    // What a loop does in a gap is asked here, not where u would be safe.
+    const esokit::MissingRule<double> hold{.hold = true};
+    const auto made = model.order == 1 ? with_controller<1>(model, d, visit, hold)
+                                       : with_controller<2>(model, d, visit, hold);
     if (made)
       rows.push_back(
           {name, d.numbers, d.control_noise, d.excess, d.modulus_margin, start, bridges});

@@ -277,7 +277,7 @@ TEST(Gating, TrustScalesTheCorrectionOfDhatAlone) {
                   plain.level_estimate(level)(i) * (i == 2 ? 0.25 : 1), 1e-12);
     }
   }
-  guarded.set_trust(hidden_nan<double>());
+  EXPECT_EQ(guarded.set_trust(hidden_nan<double>()), StepStatus::input_rejected);
   EXPECT_EQ(guarded.trust(), 0.25);
   guarded.set_trust(-3);
   EXPECT_EQ(guarded.trust(), 0);

@@ -319,16 +319,29 @@ TEST(Adrc, NoWindUp) {
               step, truth.overshoot, limited.overshoot, ignorant.overshoot);
 }
 
-TEST(Adrc, AsymmetricLimitsAndRateFromAReportedInput) {
+TEST(Adrc, AsymmetricLimitsAndRateFromTheLastCommand) {
   auto settings = base();
   settings.limits = {.lower = 0, .upper = 8, .rate = 1000};
   auto controller = Linear::make(settings).value();
   EXPECT_EQ(controller.update(0.0, 100.0), 1);  // one step of 1000 * 1 ms
   EXPECT_EQ(controller.update(0.0, -100.0), 0);
   controller.applied(6.0);
-  EXPECT_EQ(controller.update(0.0, 100.0), 7);  // the rate counts from what is held
+  EXPECT_EQ(controller.output(), 0);
+  EXPECT_EQ(controller.update(0.0, 100.0), 1);  // not from what is held
   controller.applied(20.0);
-  EXPECT_EQ(controller.update(0.0, 100.0), 8);  // held beyond the limit: back to the limit
+  EXPECT_EQ(controller.update(0.0, 100.0), 2);
+  // In manual operation the operator's u is the last command.
+  controller.track(0.0, 100.0, 6.0);
+  EXPECT_EQ(controller.update(0.0, 100.0), 7);
+  controller.track(0.0, 100.0, 5.0);
+  controller.applied(3.0);  // which the operator moved since
+  EXPECT_EQ(controller.update(0.0, 100.0), 4);
+  controller.applied(3.0);
+  EXPECT_EQ(controller.update(0.0, 100.0), 5);
+  controller.track(0.0, 100.0, 20.0);
+  EXPECT_EQ(controller.update(0.0, 100.0), 8);  // beyond the limit: back to the limit
+  controller.start(0.0, 4.0);
+  EXPECT_EQ(controller.update(0.0, 100.0), 5);
 }
 
 // ---- delay and angle

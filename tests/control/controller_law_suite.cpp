@@ -252,6 +252,41 @@ void bad_reference_keeps_the_output(const Type& type) {
     EXPECT_TRUE(finite(*c));
     c->update(0.1, 0.1);
     EXPECT_TRUE(finite(*c));
+    EXPECT_FALSE(has(c->state().status, StepStatus::reference_rejected));
+  }
+}
+
+/// At every sample, in every mode and way, and whatever is reported: no report moves the u that is
+/// kept.
+void bad_reference_is_reported_each_time(const Type& type) {
+  for (const double bad : {hidden_nan<double>(), -hidden_infinity<double>()}) {
+    for (const double rate : {20.0, 1e300}) {
+      LoopSetup setup;
+      setup.loop.limits = {.lower = -9, .upper = 9, .rate = rate};
+      setup.loop.missing = {.most = 30};
+      const Controller c = warm(type, setup);
+      const double before = c->state().output;
+      for (int k = 0; k < 100; ++k) {
+        c->applied(c->state().output + 0.25);
+        const double u = k % 7 == 6 ? c->update_without_measurement(bad) : c->update(0.1, bad);
+        EXPECT_TRUE(has(c->state().status, StepStatus::reference_rejected)) << k;
+        if (!type.error_based) {
+          EXPECT_TRUE(same_bits(u, before)) << k;
+        }
+      }
+      // There each is a lost measurement.
+      EXPECT_EQ(c->state().mode, type.error_based ? LoopMode::safe : LoopMode::running);
+      if (type.error_based) {
+        EXPECT_EQ(c->state().output, 0);
+      }
+      c->update(0.1, 0.1);
+      EXPECT_FALSE(has(c->state().status, StepStatus::reference_rejected));
+      EXPECT_EQ(c->state().mode, LoopMode::running);
+      if (!type.error_based) {
+        c->update_with_rate(0.1, 0.1, bad);
+        EXPECT_TRUE(has(c->state().status, StepStatus::reference_rejected));
+      }
+    }
   }
 }
 
@@ -270,6 +305,48 @@ void reported_input_is_believed(const Type& type) {
   own->update(0.1, 0.2);
   EXPECT_FALSE(same(*own, *told));
   EXPECT_EQ(told->state().applied_input, 0.125);
+  EXPECT_EQ(told->applied(0.125), StepStatus::ok);
+  EXPECT_EQ(told->applied(hidden_nan<double>()), StepStatus::input_rejected);
+}
+
+/// What an actuator reports is no command: in any sequence of reports u stays in its range, moves
+/// by no more than its rate, and output() is what was put out.
+void reports_do_not_move_the_command(const Type& type) {
+  for (const double sign : {1.0, -1.0}) {
+    LoopSetup setup;
+    setup.gain *= sign;
+    setup.loop.limits = {.lower = rounded(type, -0.7), .upper = rounded(type, 1.1), .rate = 20};
+    setup.loop.missing = {.most = 3, .input = 0.5};
+    const auto& limits = setup.loop.limits;
+    const Controller c = type.make(setup);
+    const double step = 20 * period * (1 + 8 * epsilon(type)) + 4 * epsilon(type);
+    Random random(31);
+    double last = c->state().output;
+    int there = 0;
+    for (int k = 0; k < 3000; ++k) {
+      const int kind = k / 50 % 8;
+      const double reports[] = {last + 0.25,           last - 0.25, 10 * last,
+                                random.uniform(-9, 9), 1e30,        hidden_nan<double>(),
+                                random.uniform(-1, 1), limits.upper};
+      for (int i = 0; i <= random.index(3); ++i) c->applied(reports[kind]);
+      ASSERT_EQ(c->state().output, last);
+      const double y = random.uniform(-0.05, 0.05);
+      const double r = kind == 5 && k % 3 == 0 ? hidden_nan<double>() : 4 * random.uniform(-1, 1);
+      const double u = random.index(20) == 0 ? c->update_without_measurement(r) : c->update(y, r);
+      ASSERT_GE(u, limits.lower);
+      ASSERT_LE(u, limits.upper);
+      ASSERT_LE(std::abs(u - last), step) << "sample " << k << ", report " << kind;
+      ASSERT_EQ(c->state().output, u);
+      there += std::abs(u - last) > 0.99 * 20 * period ? 1 : 0;
+      last = u;
+    }
+    EXPECT_GT(there, 100);
+    // A rate counts from an operator's u.
+    c->track(0, 0, limits.upper);
+    EXPECT_LE(limits.upper - c->update(0, -sign * 100), step);
+    c->start(0, limits.lower);
+    EXPECT_LE(c->update(0, sign * 100) - limits.lower, step);
+  }
 }
 
 void missing_measurements_end_in_the_safe_output(const Type& type) {
@@ -302,12 +379,61 @@ void missing_measurements_end_in_the_safe_output(const Type& type) {
       EXPECT_EQ(c->state().mode, LoopMode::running);
     }
   }
-  // Without a safe output the last one stays.
-  setup.loop.missing = {.most = 0};
-  const Controller c = warm(type, setup);
-  const double before = c->state().output;
-  EXPECT_EQ(c->update(nan, 7), before);
-  EXPECT_EQ(c->state().mode, LoopMode::safe);
+  // Without one it is zero; the last one is kept only by name, and that of the command.
+  for (const bool hold : {false, true}) {
+    for (const double rate : {100.0, 1e300}) {
+      setup.loop.limits = {.lower = -9, .upper = 9, .rate = rate};
+      setup.loop.missing = {.most = 0, .hold = hold};
+      const Controller c = warm(type, setup);
+      c->track(0, 0, 4);
+      for (int k = 0; k < 60; ++k) {
+        const double before = c->state().output;
+        if (k > 0) c->applied(before + 0.125);  // right after `track` it would be the operator's
+        const double u = c->update(nan, 7);
+        EXPECT_EQ(c->state().mode, LoopMode::safe);
+        if (rate < 1e3 && !hold && k < 7) {
+          EXPECT_NEAR(u, before - 0.5, 8 * epsilon(type));
+        } else {
+          EXPECT_EQ(u, hold ? before : k < 8 && rate < 1e3 ? u : 0);
+        }
+      }
+      EXPECT_EQ(c->state().output, hold ? c->state().output : 0);
+    }
+  }
+}
+
+void safe_output_is_stated(const Type& type) {
+  const auto said = [&](const esokit::Limits<double>& limits,
+                        const esokit::MissingRule<double>& missing) {
+    LoopSetup setup;
+    setup.loop.limits = limits;
+    setup.loop.missing = missing;
+    return type.refusal_of(setup);
+  };
+  using L = esokit::Limits<double>;
+  EXPECT_EQ(said({.lower = 0, .upper = 1}, {}), "accepted");
+  EXPECT_EQ(said({.lower = -1, .upper = 0}, {}), "accepted");
+  const L above{.lower = 0.25, .upper = 1};
+  const L below{.lower = -1, .upper = -0.25};
+  EXPECT_EQ(said(above, {}), "missing.input: must be given, as zero is below limits.lower");
+  EXPECT_EQ(said(below, {}), "missing.input: must be given, as zero is above limits.upper");
+  EXPECT_EQ(said(above, {.hold = true}), "accepted");
+  EXPECT_EQ(said(below, {.hold = true}), "accepted");
+  EXPECT_EQ(said(above, {.input = 0.25}), "accepted");
+  EXPECT_EQ(said(below, {.input = -0.25}), "accepted");
+  // Zero that is stated is no exception.
+  EXPECT_EQ(said(above, {.input = 0}), "missing.input: must not be below limits.lower");
+  EXPECT_EQ(said(below, {.input = 0}), "missing.input: must not be above limits.upper");
+  EXPECT_EQ(said({}, {.input = 0.5, .hold = true}),
+            "missing.hold: must be left out if missing.input is given");
+  LoopSetup held;
+  held.loop.limits = above;
+  held.loop.missing.input = 0.5;
+  EXPECT_EQ(type.refusal_of(held), "accepted");
+  held.loop.start_hold.time = 0.1;
+  EXPECT_EQ(type.refusal_of(held), "start_hold.input: must not be below limits.lower");
+  held.loop.start_hold.input = 0.25;
+  EXPECT_EQ(type.refusal_of(held), "accepted");
 }
 
 /// Only every D-th measurement is looked at, and the loop is as exact as ever.
@@ -459,8 +585,11 @@ constexpr Law laws[] = {ESOKIT_LAW(reaches_reference_under_disturbance),
                         ESOKIT_LAW(hold_holds),
                         ESOKIT_LAW(bad_measurement_is_a_missing_one),
                         ESOKIT_LAW(bad_reference_keeps_the_output),
+                        ESOKIT_LAW(bad_reference_is_reported_each_time),
                         ESOKIT_LAW(reported_input_is_believed),
+                        ESOKIT_LAW(reports_do_not_move_the_command),
                         ESOKIT_LAW(missing_measurements_end_in_the_safe_output),
+                        ESOKIT_LAW(safe_output_is_stated),
                         ESOKIT_LAW(divider_takes_every_dth_measurement),
                         ESOKIT_LAW(compensator_around_the_feedback_is_adrc),
                         ESOKIT_LAW(mimo_of_one_channel_is_adrc),

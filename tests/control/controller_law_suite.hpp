@@ -50,7 +50,7 @@ class AnyController {
   virtual ~AnyController() = default;
   [[nodiscard]] virtual std::unique_ptr<AnyController> copy() const = 0;
   virtual double update(double y, double r) = 0;
-  virtual void applied(double u) = 0;
+  virtual StepStatus applied(double u) = 0;
   virtual double update_with_rate(double y, double r, double rate) = 0;
   virtual double update_without_measurement(double r) = 0;
   virtual double track(double y, double r, double u_applied) = 0;
@@ -96,7 +96,7 @@ class ErasedController<Adrc<O, F>> final : public AnyController {
     return std::unique_ptr<AnyController>(new ErasedController(*this));
   }
   double update(double y, double r) override { return d(c_.update(s(y), s(r))); }
-  void applied(double u) override { c_.applied(s(u)); }
+  StepStatus applied(double u) override { return c_.applied(s(u)); }
   double update_with_rate(double y, double r, double rate) override {
     return d(c_.update(s(y), esokit::EigenMatrix<S, 2>(s(r), s(rate))));
   }
@@ -177,6 +177,7 @@ class ErasedController<Adrc<O, F>> final : public AnyController {
     config.missing.most = loop.missing.most;
     if (loop.missing.input) config.missing.input = s(*loop.missing.input);
     config.missing.stay = loop.missing.stay;
+    config.missing.hold = loop.missing.hold;
     config.measurement_divider = loop.measurement_divider;
     config.soften = setup.soften;
     return config;

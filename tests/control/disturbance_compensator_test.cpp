@@ -157,6 +157,8 @@ TEST(DisturbanceCompensator, LimitsMissingAndErrors) {
   for (int k = 0; k < 3; ++k) EXPECT_EQ(compensator.update(0, 9.0), 0.25);
   EXPECT_NEAR(compensator.update(0, 9.0), 0.35, 1e-12);
   compensator.applied(1.95);
+  EXPECT_NEAR(compensator.update(0, 9.0), 0.45, 1e-12);
+  compensator.track(0, 1.95);
   EXPECT_EQ(compensator.update(0, 9.0), 2);
   compensator.update(hidden_nan<double>(), 0.0);
   compensator.update_without_measurement(0.0);

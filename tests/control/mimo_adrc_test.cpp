@@ -314,7 +314,7 @@ TEST(MimoAdrc, BadSamplesOfOneChannel) {
   const EigenMatrix<double, 2> before = controller.output();
   EXPECT_EQ(controller.update({0, 0.1}, {nan, nan}), before);
   EXPECT_TRUE(std::isfinite(controller.update({0, 0.1}, {0, 0}).sum()));
-  controller.applied({nan, 0.5});
+  EXPECT_EQ(controller.applied({nan, 0.5}), StepStatus::input_rejected);
   controller.update({0, 0.1}, {0, 0});
   EXPECT_TRUE(std::isfinite(controller.output().sum()));
   {
@@ -343,7 +343,8 @@ TEST(MimoAdrc, BadReferenceOfOneChannel) {
         const EigenMatrix<double, 2> drive = b0 * controller.update(y, r);
         ASSERT_NEAR(drive(channel), held(channel), 1e-9 * std::abs(held(channel)));
         ASSERT_NEAR(drive(1 - channel), good(1 - channel), 1e-9 * std::abs(good(1 - channel)));
-        ASSERT_EQ(controller.status(channel), StepStatus::ok);
+        ASSERT_EQ(controller.status(channel), StepStatus::reference_rejected);
+        ASSERT_EQ(controller.status(1 - channel), StepStatus::ok);
         y += EigenMatrix<double, 2>(0.01, -0.01);
       }
     }

@@ -542,7 +542,7 @@ TEST(PredictiveAdrc, a_late_report_corrects_the_prediction) {
   late_report<Cascade>(config);
 }
 
-TEST(PredictiveAdrc, the_rate_limit_goes_on_from_what_was_reported) {
+TEST(PredictiveAdrc, the_rate_limit_goes_on_from_what_was_commanded) {
   auto config = typical();
   config.limits.rate = 1 / period;
   for (const bool late : {false, true}) {
@@ -552,10 +552,20 @@ TEST(PredictiveAdrc, the_rate_limit_goes_on_from_what_was_reported) {
     if (late) controller.prepare(1e6);
     controller.applied(-5);
     if (!late) controller.prepare(1e6);
-    EXPECT_EQ(controller.control(0), -4);
+    EXPECT_EQ(controller.observer().applied_input(), -5);
+    EXPECT_EQ(controller.output(), 1);
+    EXPECT_EQ(controller.control(0), 2);
     // Downwards as well.
     controller.prepare(-1e6);
-    EXPECT_EQ(controller.control(0), -5);
+    EXPECT_EQ(controller.control(0), 1);
+    // An operator's u is the last command.
+    controller.prepare(1e6);
+    EXPECT_EQ(controller.start(0, -3), StepStatus::ok);
+    controller.set_reference(1e6);
+    if (late) {
+      EXPECT_EQ(controller.applied(-5), StepStatus::ok);
+    }
+    EXPECT_EQ(controller.control(0), late ? -4 : -2);
   }
 }
 

@@ -149,6 +149,16 @@ void by_gains(Config& c) {
   c.gains.emplace().fill(7);
 }
 
+/// Without a safe input, which excludes that the last u is held.
+template <class Config>
+void unsaid(Config& c) {
+  if constexpr (requires { c.observers; }) {
+    for (auto& missing : c.missing) missing.input.reset();
+  } else {
+    c.missing.input.reset();
+  }
+}
+
 template <class Config>
 void softly(Config& c) {
   c.soften = true;
@@ -160,21 +170,26 @@ TEST(Settings, OfControllersAreAdopted) {
   every_setting_is_adopted("Adrc<VariableTime>",
                            {of<Varying>([](auto& c) { c.missing.stay = true; }),
                             of<Varying>([](auto& c) { c.domain = TimeDomain::sampled; }),
-                            of<Varying>(by_gains), of<Varying>(softly)},
+                            of<Varying>(by_gains), of<Varying>(softly), of<Varying>(unsaid)},
                            {13, 14});
   using Guards = Adrc<Guarded<LinearEso<1>>, ErrorBased>;
-  every_setting_is_adopted("Adrc<Guarded>",
-                           {of<Guards>(), of<Guards>(by_gains), of<Guards>(softly)}, {15, 16});
+  every_setting_is_adopted(
+      "Adrc<Guarded>", {of<Guards>(), of<Guards>(by_gains), of<Guards>(softly), of<Guards>(unsaid)},
+      {15, 16});
   using Plain = Adrc<LinearEso<1>>;
-  every_setting_is_adopted("Adrc", {of<Plain>(), of<Plain>(by_gains), of<Plain>(softly)}, {11, 12});
+  every_setting_is_adopted(
+      "Adrc", {of<Plain>(), of<Plain>(by_gains), of<Plain>(softly), of<Plain>(unsaid)}, {11, 12});
   using Predictive = PredictiveAdrc<LinearEso<2>>;
-  every_setting_is_adopted("PredictiveAdrc", {of<Predictive>(), of<Predictive>(by_gains)});
+  every_setting_is_adopted("PredictiveAdrc",
+                           {of<Predictive>(), of<Predictive>(by_gains), of<Predictive>(unsaid)});
   using Around = DisturbanceCompensator<LinearEso<1>>;
-  every_setting_is_adopted("DisturbanceCompensator",
-                           {of<Around>(), of<Around>([](auto& c) { c.compensation_gain = -0.25; })},
-                           {9, 10});
+  every_setting_is_adopted(
+      "DisturbanceCompensator",
+      {of<Around>(), of<Around>([](auto& c) { c.compensation_gain = -0.25; }), of<Around>(unsaid)},
+      {9, 10});
   // b0 is that of the matrix, and all channels have one sample time.
-  every_setting_is_adopted(NAMED(MimoAdrc<LinearEso<1>, LinearEso<2>>), {1, 2, 5, 6});
+  using Two = MimoAdrc<LinearEso<1>, LinearEso<2>>;
+  every_setting_is_adopted("MimoAdrc", {of<Two>(), of<Two>(unsaid)}, {1, 2, 5, 6});
 }
 
 /// What is held at the start is of what was just made: with u it hands over a state, so there is no

@@ -167,6 +167,15 @@ class Filler {
     }
   }
 
+  template <class Rule>
+  void missing(Rule& rule) {
+    rule.most = tape_.integer(0, 40, "missing.most");
+    number("missing.input", rule.input, {1.5, 2});
+    rule.stay = tape_.once_in(5, "missing.stay");
+    rule.hold = (!rule.input || tape_.once_in(20, "both")) && tape_.once_in(2, "missing.hold");
+    promise.stays_safe = promise.stays_safe || rule.stay;
+  }
+
   /// (A, B, C, E) of a plant of relative degree `order_` whose states couple as those of a chain,
   /// what feeds back slower than a sample; with zeros, and d elsewhere than u.
   template <class Plant>
@@ -414,11 +423,10 @@ class Filler {
     } else {
       MEMBER(blanking, number(text, member, {0, 20 * T}))
     }
-    if constexpr (requires { config.missing.most; }) {
-      config.missing.most = tape_.integer(0, 40, "missing.most");
-      number("missing.input", config.missing.input, {1.5, 2});
-      config.missing.stay = tape_.once_in(5, "missing.stay");
-      promise.stays_safe = promise.stays_safe || config.missing.stay;
+    if constexpr (requires { config.missing.size(); }) {
+      for (auto& each : config.missing) missing(each);
+    } else if constexpr (requires { config.missing.most; }) {
+      missing(config.missing);
     }
     if constexpr (requires { config.measurement_divider; }) {
       if (tape_.once_in(4, "divided")) {

@@ -185,7 +185,7 @@ class Driver final : public Game {
     Game::stepped(status, y == nullptr || is_finite(*y), u == nullptr || is_finite(*u));
   }
 
-  /// A controller put out u; `from` is what the actuator held before.
+  /// A controller put out u; `from` is what was commanded before.
   void put_out(S u, S from) {
     if (!is_finite(u)) return fail("u is not finite");
     check_limits(config_.limits, u, from);
@@ -349,12 +349,18 @@ class Driver final : public Game {
   template <class Function>
   void control(const S* y, const S* u_applied, Function&& call) {
     S from = object_->output();
-    if (u_applied != nullptr && is_finite(*u_applied)) from = *u_applied;
+    // What the actuator reports is no command, unless something else commands it.
+    if (elsewhere_ && u_applied != nullptr && is_finite(*u_applied)) from = *u_applied;
+    elsewhere_ = false;
     const S u = quietly(call);
     put_out(u, from);
     if constexpr (requires(const T& o) { o.mode(); }) {
       if (measurement_due() && y != nullptr) stepped(object_->status(), y, nullptr);
-      if constexpr (requires(const T& o) { o.observer().missed(); }) judge_mode();
+      if constexpr (requires(T & o, S s) { o.prepare(s); }) {
+        judge_next_mode();
+      } else if constexpr (requires(const T& o) { o.observer().missed(); }) {
+        judge_mode();
+      }
     } else if constexpr (requires(const T& o) { o.form(); }) {
       stepped(object_->status(), y, nullptr);
     }
@@ -376,11 +382,26 @@ class Driver final : public Game {
     }
   }
 
+  /// The same of a controller in two phases, of the next sample.
+  void judge_next_mode() {
+    const int missed = object_->observer().missed() - 1;
+    if (missed > config_.missing.most && object_->mode() != LoopMode::safe) {
+      fail("too many measurements are missing, and the next mode is not safe");
+    }
+    if (object_->mode() == LoopMode::safe && missed <= 0 && !config_.missing.stay) {
+      fail("measurements are there, and the next mode is safe");
+    }
+  }
+
   static constexpr bool runs_on = [] {
     if constexpr (requires { T::runs_on; }) return T::runs_on;
     return false;
   }();
   /// The second number of an experiment's update is no reference.
+  static constexpr bool reports_reference = requires(const T& o) {
+    o.mode();
+    o.requested();
+  };
   static constexpr bool takes_applied_input = requires(const T& o) { o.rest_output(); };
 
   static const std::vector<Action>& actions() {
@@ -456,7 +477,8 @@ class Driver final : public Game {
       if constexpr (requires(T & o, S s) { o.set_trust(s); }) {
         add(a, "set_trust", [](Driver& d) {
           const S phi = d.number({0, 1});
-          d.quietly([&] { d.object_->set_trust(phi); });
+          const StepStatus said = d.quietly([&] { return d.object_->set_trust(phi); });
+          if (is_finite(phi) != (said == StepStatus::ok)) d.fail("a bad trust is not reported");
         });
         add(a, "set_pin", [](Driver& d) {
           const int where = d.tape_->choice(4);
@@ -527,6 +549,7 @@ class Driver final : public Game {
           add(a, "update(y, r)", [](Driver& d) {
             const S y = d.number(), r = d.number();
             d.control(&y, nullptr, [&] { return d.object_->update(y, r); });
+            if constexpr (reports_reference) d.referred(is_finite(r));
           });
         }
       }
@@ -541,6 +564,7 @@ class Driver final : public Game {
               d.object_->applied(u);
               return d.object_->update(y, r);
             });
+            if constexpr (reports_reference) d.referred(is_finite(r));
           });
         }
       }
@@ -549,19 +573,23 @@ class Driver final : public Game {
           const S y = d.number();
           const auto r = d.template state<typename T::Reference::All>();
           d.control(&y, nullptr, [&] { return d.object_->update(y, r); });
+          d.referred_to(r);
         });
         add(a, "applied(u), update(y, references)", [](Driver& d) {
           const S y = d.number();
           const auto r = d.template state<typename T::Reference::All>();
           const S u = d.number();
           d.control(&y, &u, [&] {
-            d.object_->applied(u);
+            if (is_finite(u) == (d.object_->applied(u) != StepStatus::ok))
+              d.fail("a bad u is taken");
             return d.object_->update(y, r);
           });
+          d.referred_to(r);
         });
         add(a, "update_without_measurement(references)", [](Driver& d) {
           const auto r = d.template state<typename T::Reference::All>();
           d.control(nullptr, nullptr, [&] { return d.object_->update_without_measurement(r); });
+          d.referred_to(r);
         });
       }
       if constexpr (requires(T & o, S s) { o.update_without_measurement(s); }) {
@@ -570,6 +598,7 @@ class Driver final : public Game {
           const S r = d.number();
           for (int i = 0; i < count; ++i) {
             d.control(nullptr, nullptr, [&] { return d.object_->update_without_measurement(r); });
+            d.referred(is_finite(r));
           }
         });
       }
@@ -613,6 +642,7 @@ class Driver final : public Game {
         add(a, "start(y, u)", [](Driver& d) {
           const S y = d.number(), u = d.number();
           d.refusable([&] { return d.object_->start(y, u); });
+          d.elsewhere_ = d.elsewhere_ || d.accepted_;
           if (!(is_finite(y) && is_finite(u)) && d.accepted_) d.fail("a bad start is taken");
         });
       }
@@ -620,6 +650,7 @@ class Driver final : public Game {
         add(a, "start(y, u, r)", [](Driver& d) {
           const S y = d.number(), u = d.number(), r = d.number();
           d.refusable([&] { return d.object_->start(y, u, r); });
+          d.elsewhere_ = d.elsewhere_ || d.accepted_;
           if (!(is_finite(y) && is_finite(u)) && d.accepted_) d.fail("a bad start is taken");
         });
       }
@@ -675,6 +706,19 @@ class Driver final : public Game {
 
   void tracked(S u) {
     if (!is_finite(u)) fail("u is not finite");
+    elsewhere_ = true;
+  }
+
+  /// A reference that cannot be followed is reported at each sample.
+  void referred(bool fine) {
+    if (!fine && !has(object_->status(), StepStatus::reference_rejected)) {
+      fail("a bad reference is not reported");
+    }
+  }
+  template <class R>
+  void referred_to(const R& r) {
+    // The error-based form takes only the first.
+    referred(is_finite(S(r(0))));
   }
 
   template <class O>
@@ -704,6 +748,8 @@ class Driver final : public Game {
         const StepStatus status = d.quietly([&] { return d.object_->prepare(r); });
         d.stepped(status, &y, nullptr);
         if (status != d.object_->status()) d.fail("status() is another one");
+        d.referred(is_finite(r));
+        d.judge_next_mode();
       });
     }
     add(a, "update", [](Driver& d) {
@@ -718,6 +764,7 @@ class Driver final : public Game {
         const S from = d.object_->output();
         d.put_out(d.quietly([&] { return d.object_->control_without_measurement(); }), from);
         (void)d.object_->prepare(r);
+        d.judge_next_mode();
       }
     });
     add(a, "control, applied, prepare(references)", [](Driver& d) {
@@ -754,20 +801,26 @@ class Driver final : public Game {
       add(a, "update", [](Driver& d) {
         const V y = d.template vector<V>(), r = d.template vector<V>();
         const V from = d.object_->output();
+        d.elsewhere_ = false;
         d.all_out(y, d.quietly([&] { return d.object_->update(y, r); }), from);
+        d.all_referred(r);
       });
       add(a, "update, reported", [](Driver& d) {
         const V y = d.template vector<V>(), r = d.template vector<V>(), u = d.template vector<V>();
         V from = d.object_->output();
-        for (int i = 0; i < from.size(); ++i) {
+        for (int i = 0; d.elsewhere_ && i < from.size(); ++i) {
           if (is_finite(u(i))) from(i) = u(i);
         }
-        d.quietly([&] { d.object_->applied(u); });
+        d.elsewhere_ = false;
+        const StepStatus reported = d.quietly([&] { return d.object_->applied(u); });
+        if (fine(u) == has(reported, StepStatus::input_rejected)) d.fail("a bad u is not reported");
         d.all_out(y, d.quietly([&] { return d.object_->update(y, r); }), from);
+        d.all_referred(r);
       });
       add(a, "start", [](Driver& d) {
         const V y = d.template vector<V>(), u = d.template vector<V>();
         d.refusable([&] { return d.object_->start(y, u); });
+        d.elsewhere_ = d.elsewhere_ || d.accepted_;
         if (!(fine(y) && fine(u)) && d.accepted_) d.fail("a bad start is taken");
       });
       add(a, "set_input_matrix", [](Driver& d) {
@@ -783,6 +836,7 @@ class Driver final : public Game {
             if (is_finite(u(i))) from(i) = u(i);
           }
           const V now = d.quietly([&] { return d.object_->hold(y, u); });
+          d.elsewhere_ = true;
           for (int i = 0; i < from.size(); ++i) {
             if (now(i) < from(i) || now(i) > from(i)) d.fail("hold changes u");
           }
@@ -832,6 +886,26 @@ class Driver final : public Game {
   }
 
   template <class V>
+  void all_referred(const V& r) {
+    int missed = 0;
+    bool stays = false;
+    esokit::detail::unroll<T::channels>([&](auto i) {
+      if (!is_finite(S(r(i))) && !has(object_->status(i), StepStatus::reference_rejected)) {
+        fail("a bad reference is not reported");
+      }
+      const auto& rule = config_.missing[static_cast<std::size_t>(i)];
+      const int lost = object_->template observer<i>().missed();
+      missed = std::max(missed, lost);
+      stays = stays || rule.stay;
+      if (lost > rule.most && object_->mode() != LoopMode::safe) {
+        fail("too many measurements are missing, and the mode is not safe");
+      }
+    });
+    if (missed == 0 && !stays && object_->mode() == LoopMode::safe) {
+      fail("measurements are there, and the mode is safe");
+    }
+  }
+  template <class V>
   void all_out(const V& y, const V& u, const V& from) {
     for (int i = 0; i < u.size(); ++i) {
       if (!is_finite(u(i))) return fail("u is not finite");
@@ -850,6 +924,13 @@ class Driver final : public Game {
 
   // Differentiators and limiters.
   /// An experiment.
+  template <class Function>
+  void moves(Function&& call) {
+    const S from = object_->output();
+    const S u = quietly(call);
+    check_limits(config_.limits, u, from);
+    moved(u);
+  }
   void moved(S u) {
     const S low = config_.input - config_.amplitude, high = config_.input + config_.amplitude;
     const bool at_once = !(config_.limits.rate < esokit::Limits<S>{}.rate);
@@ -879,24 +960,24 @@ class Driver final : public Game {
       for (int weight = 0; weight < 4; ++weight) {
         add(a, "update", [](Driver& d) {
           const S y = d.number();
-          d.moved(d.quietly([&] { return d.object_->update(y); }));
+          d.moves([&] { return d.object_->update(y); });
         });
         add(a, "update to and fro", [](Driver& d) {
           const S one = d.number({-1, 1}), other = d.number({-1, 1});
           const int half = 1 + d.tape_->choice(40), count = d.tape_->choice(1000);
           for (int i = 0; i < count; ++i) {
             const S y = i / half % 2 == 0 ? one : other;
-            d.moved(d.quietly([&] { return d.object_->update(y); }));
+            d.moves([&] { return d.object_->update(y); });
           }
         });
       }
       add(a, "update(y, u)", [](Driver& d) {
         const S y = d.number(), u = d.number();
-        d.moved(d.quietly([&] { return d.object_->update(y, u); }));
+        d.moves([&] { return d.object_->update(y, u); });
       });
       add(a, "stop", [](Driver& d) {
         if (d.tape_->choice(8) != 0) return;
-        d.moved(d.quietly([&] { return d.object_->stop(); }));
+        d.moves([&] { return d.object_->stop(); });
         if (!d.object_->finished()) d.fail("stopped, and not finished");
       });
     }
@@ -1070,6 +1151,7 @@ class Driver final : public Game {
   }
 
   Config config_{};
+  bool elsewhere_ = false;  ///< u is commanded by something else
   std::optional<T> object_{};
   std::optional<T> twin_{};
 };

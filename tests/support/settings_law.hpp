@@ -81,6 +81,7 @@ void fill(Config& config) {
     config.controller_bandwidths.fill(4);
     config.input_matrix = {{2, 0.25}, {0.5, -1}};
     for (auto& limits : config.limits) limits = {-3, 2.5, 150};
+    for (auto& missing : config.missing) missing = {.most = 8, .input = 1};
   }
   if constexpr (requires { config.sample_time; }) {
     config.sample_time = 0.0078125;

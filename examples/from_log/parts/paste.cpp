@@ -641,7 +641,8 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
   const std::string highest = derivative_of("y", p.order);
   const auto gains = static_cast<int>(design.settings.gains.size());
   const std::string limits_of_u = ".limits = {.lower = " + source(model.u_min - p.reach()) +
-                                  ", .upper = " + source(model.u_max + p.reach()) + "}, " +
+                                  ", .upper = " + source(model.u_max + p.reach()) +
+                                  "}, .missing = {.input = " + source(model.safe_input()) + "}, " +
                                   parts.soften;
   const bool known = p.feeds_forward();
 
@@ -734,7 +735,11 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
     body += "              " + threshold + "},\n";
   }
   body += wrapped(parts.law + ",", "         ", " ");
-  body += "         " + limits_of_u + "});  // u\n";
+  body += comment(
+      "u: its limits, and where it goes if y stays away for long. Choose it: a lifting axis needs "
+      "the u at which it rests, or zero and a brake.",
+      "         ");
+  body += wrapped(limits_of_u + "});", "         ", " ");
   body += comment("From rest to rest, with all derivatives: largest abs(r'), .., abs(r" +
                       std::string(static_cast<std::size_t>(gains), '\'') + "), 0 is none. " +
                       highest + " needs half of what the forces of the log leave of u.",
@@ -822,10 +827,11 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
         "    controller.applied(u - fed);  // if the actuator reports what it really held, in "
         "place "
         "of u\n"
-        "    u = std::clamp(controller.update(y, r) + more, " +
-        source(model.u_min) + ", " + source(model.u_max) +
-        ");\n"
-        "    fed = more;\n";
+        "    const double of_law = controller.update(y, r);\n"
+        "    // Without y nothing is added.\n"
+        "    fed = controller.mode() == esokit::LoopMode::safe ? 0.0 : more;\n"
+        "    u = std::clamp(of_law + fed, " +
+        source(model.u_min) + ", " + source(model.u_max) + ");\n";
   } else {
     body +=
         "    // If the actuator reports what it really held, say controller.applied(..) before.\n"

@@ -199,11 +199,13 @@ requires(detail::goes_into_a_loop<Observer>()) class Guarded
   StepStatus reset(const Estimate& state) noexcept { return begin(observer_.reset(state)); }
 
   /// From the next correction on, corrections of dhat are multiplied by `phi`, 0 .. 1. A smaller or
-  /// larger phi counts as 0 or 1; one that is not finite changes nothing.
-  void set_trust(const S& phi) noexcept requires gates {
-    if (!is_finite(phi)) return;
+  /// larger phi counts as 0 or 1. @return ok, or input_rejected for one that is not finite, which
+  /// changes nothing
+  StepStatus set_trust(const S& phi) noexcept requires gates {
+    if (!is_finite(phi)) return StepStatus::input_rejected;
     weights_.trust = phi < S(0) ? S(0) : phi < S(1) ? phi : S(1);
     set_weights();
+    return StepStatus::ok;
   }
 
   /// Tells at which limit the actuator is, from the next correction on. Call it once, or at every

@@ -40,13 +40,15 @@ requires(detail::goes_into_a_loop<Observer>()) struct AdrcConfig {
 ///
 /// Timing: `update` at sample k takes y[k] and the present reference and returns the u to be held
 /// until k + 1. The observer takes the limited u that `update` returned last as the input from k -
-/// 1 to k; if the actuator reports another value, say `applied(u)` before `update`.
+/// 1 to k; if the actuator reports another value, say `applied(u)` before `update`. Limits of rate
+/// count from what `update` returned, not from what is reported: a sensor of u has errors and the
+/// actuator lags.
 ///
 /// Start: after `make` the controller is at y = 0, u = 0. `start(y, u)` takes over a plant at rest
 /// at y under u without a bump: with the reference at y, or a tracking differentiator reset to y,
 /// the first output is this u. During manual operation pass the operator's u to `track`, then
 /// continue with `update`; u does not jump if the plant has come to rest (dhat = -b0 u) and the
-/// reference is at y.
+/// reference is at y. After both the rate limit counts from that u.
 ///
 /// Retuning (`retune`, any member of the config): the estimate and u are kept. A change of omega_o
 /// does not change u if the innovation is zero. A change of b0 is moved into dhat as (b0_old -
@@ -56,7 +58,8 @@ requires(detail::goes_into_a_loop<Observer>()) struct AdrcConfig {
 ///
 /// Missing measurements: NaN or `update_without_measurement`. The observer predicts, and later
 /// corrects with the gain for the whole gap. After more than `missing.most` missing measurements in
-/// a row, `mode()` is `safe` and u goes to `missing.input`.
+/// a row, `mode()` is `safe` and u goes to `missing.input`, by default to zero: see MissingRule for
+/// what to choose.
 ///
 /// Overload (`soften`): for n >= 3 (of the law, so with the lag of an actuator in the model) a loop
 /// is stable for a range of gains only, and limits lower its gain. Below that range it swings from
@@ -67,8 +70,9 @@ requires(detail::goes_into_a_loop<Observer>()) struct AdrcConfig {
 /// another one. PredictiveAdrc and MimoAdrc do not have it.
 ///
 /// If the reference is not finite, u is kept (in the error-based form the measurement counts as
-/// missing). An applied u that is not finite is replaced by the last output. No call allocates,
-/// throws or locks.
+/// missing); each such sample reports `reference_rejected`. It is for you to decide for how long
+/// that may last: u is then no answer to y. An applied u that is not finite is reported, and
+/// replaced by the last output. No call allocates, throws or locks.
 ///
 /// Delays, angles, a changing sample time and known nonlinear terms are handled by the observer:
 /// put DelayedInput, WrappedOutput, VariableTime or KnownModel around it. They can be nested, with
@@ -129,8 +133,8 @@ requires(detail::goes_into_a_loop<Observer>()) class Adrc {
   }
 
   /// What the actuator held since the last sample, if it was not the last output: say it before
-  /// `update`. A u that is not finite changes nothing. @{
-  void applied(S u) noexcept { loop_.applied(u); }
+  /// `update`. @return ok, or input_rejected for a u that is not finite, which changes nothing @{
+  StatusType applied(S u) noexcept { return loop_.applied(u); }
   S update(S y, const Reference& reference, S u) = delete;  // call applied(u) before update
   /// @}
 
@@ -246,8 +250,8 @@ requires(detail::goes_into_a_loop<Observer>()) class Adrc {
   [[nodiscard]] Observer& observer() noexcept { return loop_.observer(); }
   /// T, s.
   [[nodiscard]] S sample_time() const noexcept { return loop_.observer().sample_time(); }
-  /// The present u, within the limits.
-  [[nodiscard]] const S& output() const noexcept { return loop_.output(); }
+  /// The present u, within the limits, whatever is reported as applied.
+  [[nodiscard]] S output() const noexcept { return loop_.output(); }
   /// The u requested by the law, before the limits.
   [[nodiscard]] const S& requested() const noexcept { return loop_.requested(); }
   /// The limits of u.
@@ -283,11 +287,21 @@ requires(detail::goes_into_a_loop<Observer>()) class Adrc {
   template <class Given>
   ESOKIT_INLINE auto asked(const Given& reference) noexcept {
     if constexpr (std::is_same_v<Given, S>) {  // a number that need not lie in memory
-      return [this, reference](bool special)
-                 ESOKIT_INLINE_LAMBDA { return special ? judged(reference) : command(reference); };
+      return detail::Asked{[this, reference](bool special) ESOKIT_INLINE_LAMBDA {
+                             return special ? judged(reference) : command(reference);
+                           },
+                           [reference] { return all(is_finite(reference)); }};
     } else {
-      return [this, &reference](bool special)
-                 ESOKIT_INLINE_LAMBDA { return special ? judged(reference) : command(reference); };
+      return detail::Asked{[this, &reference](bool special) ESOKIT_INLINE_LAMBDA {
+                             return special ? judged(reference) : command(reference);
+                           },
+                           [&reference] {
+                             bool good = true;
+                             for (int i = 0; i < (error_based ? 1 : order + 1); ++i) {
+                               good = good && all(is_finite(reference(i)));
+                             }
+                             return good;
+                           }};
     }
   }
   struct NoSpec {
@@ -366,7 +380,7 @@ requires(detail::goes_into_a_loop<Observer>()) class Adrc {
   /// A sample, for a constant and for a moving reference.
   template <class Given>
   ESOKIT_INLINE S stepped(S y, Given reference) noexcept {
-    return loop_.step(y, loop_.output(), asked(reference));
+    return loop_.step(y, loop_.held(), asked(reference));
   }
 
   [[nodiscard]] ESOKIT_INLINE S command(S reference) const noexcept {
@@ -436,8 +450,8 @@ requires(detail::goes_into_a_loop<Observer>()) class Adrc {
   requires(detail::LaneAccess::steps<O>) S update_advanced(S y, const Reference& reference)
   noexcept {
     y = measured(y, reference(0));
-    return reference.moves() ? loop_.template step<true>(y, loop_.output(), asked(reference.all()))
-                             : loop_.template step<true>(y, loop_.output(), asked(reference(0)));
+    return reference.moves() ? loop_.template step<true>(y, loop_.held(), asked(reference.all()))
+                             : loop_.template step<true>(y, loop_.held(), asked(reference(0)));
   }
   /// @}
 

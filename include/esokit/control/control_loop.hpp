@@ -21,14 +21,18 @@ struct StartHold {
   S input{};  ///< u during the hold, within the limits
 };
 
-/// What happens if measurements are missing (or NaN).
+/// What happens if measurements are missing (or NaN): they are bridged, then u goes to a value that
+/// needs no sensor. Choose it: zero stops most drives; a lifting axis needs the u at which it
+/// rests, or zero and a brake; a drone the thrust at which it sinks slowly. With limits that do not
+/// contain zero it has to be given. `hold` keeps an actuator at full torque if it was there.
 template <Scalar S = double>
 struct MissingRule {
-  int most = 50;  ///< missing measurements in a row that the controller bridges, 0 up to
-                  ///< 65534 / measurement_divider - 1
-  std::optional<S>
-      input{};        ///< u in safe mode, approached within the rate limit; left out: the last u
-  bool stay = false;  ///< true: safe mode lasts until start(); false: until a measurement
+  int most = 50;             ///< missing measurements in a row that the controller bridges, 0 up to
+                             ///< 65534 / measurement_divider - 1
+  std::optional<S> input{};  ///< u in safe mode, within the limits and approached within the rate
+                             ///< limit; left out: zero
+  bool stay = false;         ///< true: safe mode lasts until start(); false: until a measurement
+  bool hold = false;         ///< true, instead of `input`: safe mode holds the last u, for ever
 };
 
 /// Settings of a ControlLoop; a controller's config repeats them by name.
@@ -44,13 +48,36 @@ namespace detail {
 
 template <PlainScalar S>
 Check<S> check_within(const char* field, const S& input, const Limits<S>& limits) {
-  const bool nothing_said = !(input < S(0)) && !(input > S(0));
   return Rules<S>{}
       .finite(field, input)
-      .demand(nothing_said || at_most(limits.lower, input),
+      .demand(at_most(limits.lower, input),
               {field, input, "must not be below limits.lower", -1, limits.lower, true})
-      .demand(nothing_said || at_most(input, limits.upper),
+      .demand(at_most(input, limits.upper),
               {field, input, "must not be above limits.upper", -1, limits.upper, true});
+}
+
+/// Of a finished rule. @param divider measurements are due at each so many steps
+template <PlainScalar S>
+Check<S> check_missing(const MissingRule<S>& missing, const Limits<S>& limits, int divider = 1) {
+  constexpr const char* field = "missing.input";
+  Rules<S> rules;
+  if (missing.input) {
+    rules.all_of(check_within(field, *missing.input, limits))
+        .demand(!missing.hold, "missing.hold", S(1), "must be left out if missing.input is given");
+  } else if (!missing.hold) {
+    rules
+        .demand(
+            !(limits.lower > S(0)),
+            {field, S(0), "must be given, as zero is below limits.lower", -1, limits.lower, true})
+        .demand(
+            !(limits.upper < S(0)),
+            {field, S(0), "must be given, as zero is above limits.upper", -1, limits.upper, true});
+  }
+  // The observer counts missing samples up to 65533.
+  const int most = 65534 / divider - 1;
+  return rules.demand(0 <= missing.most && missing.most <= most,
+                      {"missing.most", static_cast<S>(missing.most),
+                       "must be 0 up to 65534 samples, that is", -1, static_cast<S>(most), true});
 }
 
 template <PlainScalar S>
@@ -69,26 +96,21 @@ Expected<CheckedLoop<S>, Error<S>> check_loop(const LoopSettings<S>& settings, S
   const int divider = settings.measurement_divider;
   const auto counted = static_cast<S>(divider);
   Rules<S> rules;
-  rules.not_negative("start_hold.time", settings.start_hold.time)
-      .all_of(check_within("start_hold.input", settings.start_hold.input, settings.limits))
-      .demand(samples < S(1 << 24), "start_hold.time", settings.start_hold.time,
-              "must be below 2^24 samples");
-  if (settings.missing.input) {
-    rules.all_of(check_within("missing.input", *settings.missing.input, settings.limits));
+  const StartHold<S>& hold = settings.start_hold;
+  rules.not_negative("start_hold.time", hold.time);
+  // Of a hold that is left out nothing was said.
+  if (hold.time > S(0) || hold.input < S(0) || hold.input > S(0) || !is_finite(hold.input)) {
+    rules.all_of(check_within("start_hold.input", hold.input, settings.limits));
   }
-  rules.demand(1 <= divider && divider <= 1000, "measurement_divider", counted, "must be 1 .. 1000")
+  rules.demand(samples < S(1 << 24), "start_hold.time", hold.time, "must be below 2^24 samples")
+      .demand(1 <= divider && divider <= 1000, "measurement_divider", counted, "must be 1 .. 1000")
       .demand(divider == 1 || divider <= max_gap,
               {"measurement_divider", counted, "must not be above the observer's max_gap, which is",
                -1, static_cast<S>(max_gap), true})
       .demand(divider == 1 || bears_gaps, "measurement_divider", counted,
               "must be 1: regular gaps restart this observer");
   if (!rules) return rules.error();
-  // The observer counts missing samples up to 65533.
-  const int most = 65534 / divider - 1;
-  rules.demand(0 <= settings.missing.most && settings.missing.most <= most,
-               {"missing.most", static_cast<S>(settings.missing.most),
-                "must be 0 up to 65534 samples, that is", -1, static_cast<S>(most), true});
-  if (!rules) return rules.error();
+  if (auto ok = check_missing(settings.missing, settings.limits, divider); !ok) return ok.error();
   return CheckedLoop<S>{*limiter, static_cast<std::uint32_t>(samples)};
 }
 
@@ -124,6 +146,16 @@ ESOKIT_INLINE S wrapped(const Observer& observer, const S& difference) noexcept 
     return difference;
   }
 }
+
+/// A law as a ControlLoop asks for it.
+template <class U, class Takes>
+struct Asked {
+  U u;
+  Takes takes;  ///< whether what the law is given is finite
+  ESOKIT_INLINE auto operator()(bool special) noexcept { return u(special); }
+};
+template <class U, class Takes>
+Asked(U, Takes) -> Asked<U, Takes>;
 
 /// Converts a u computed with b0 of the observer's config to the present b0.
 template <class Observer, Scalar S>
@@ -175,7 +207,8 @@ class ControlLoop {
   /// template, as an explicit instantiation would ask it of every observer.
   template <class O = Observer>
   requires(detail::LaneAccess::steps<O>) ESOKIT_INLINE bool advance() noexcept {
-    const bool ordinary = special_ == false || (mode_ == LoopMode::running && set_.divider == 1);
+    const bool ordinary = special_ == false ||
+                          (mode_ == LoopMode::running && set_.divider == 1 && elsewhere_ == false);
     return ordinary && detail::LaneAccess::advance(observer_);
   }
   template <class Law>
@@ -188,15 +221,33 @@ class ControlLoop {
   /// @endcond
 
   /// What the actuator held since the last step, if it was not the last output: before the step.
-  /// A u that is not finite changes nothing.
-  void applied(S u) noexcept { limiter_.track(select(is_finite(u), u, limiter_.last())); }
+  /// The observer gets it; the rate limit counts from the last output. Only between `start`,
+  /// `track` or `hold` and the next step it is the operator's, and the rate limit counts from it.
+  /// @return ok, or input_rejected for a u that is not finite, which changes nothing
+  StatusType applied(S u) noexcept {
+    const auto good = is_finite(u);
+    u = select(good, u, limiter_.last());
+    if (!(elsewhere_ == false)) [[unlikely]] {
+      S command = output();
+      if constexpr (lane_count<S> == 1) {
+        command = requested_ = u;
+      } else {
+        for (int i = 0; i < lane_count<S>; ++i) {
+          if (elsewhere_[i]) command[i] = requested_[i] = u[i];
+        }
+      }
+      limiter_.track(command);
+    }
+    limiter_.applied(u);
+    return detail::unless<S>(good, StepStatus::input_rejected);
+  }
 
   /// One sample: the observer's update, then the law.
   /// @param measured measurement at sample k, NaN if missing
   /// @param drive what drove the observer's chain from k - 1 to k: the last output of this loop,
   ///        unless something other than u does
   /// @param law (bool) -> S, the requested u, computed from the new estimate. True in samples in
-  ///        which something is special
+  ///        which something is special. Its `takes()` is false if what it was given is not finite
   /// @tparam Advanced of a lane, after `advance`
   /// @return u for k .. k+1
   template <bool Advanced = false, class Law>
@@ -227,11 +278,12 @@ class ControlLoop {
     return put_out(law);
   }
 
-  /// Manual operation: the observer runs, the output is the operator's.
+  /// Manual operation: the observer runs, the output is the operator's, and the next one counts
+  /// from it.
   /// @param u_applied what was held from k - 1 to k @return the same
   S track(S measured, S u_applied) noexcept {
-    applied(u_applied);
-    follow(measured, limiter_.last());
+    const StatusType told = take_over(u_applied);
+    follow(measured, limiter_.last(), told);
     return limiter_.last();
   }
 
@@ -240,8 +292,8 @@ class ControlLoop {
   template <class O = Observer>
   requires(observer_traits<O>.gates_disturbance) S hold(S measured, S u_applied)
   noexcept {
-    applied(u_applied);
-    follow(measured, observer_.hold(limiter_.last()));
+    const StatusType told = take_over(u_applied);
+    follow(measured, observer_.hold(limiter_.last()), told);
     observer_.release();
     return limiter_.last();
   }
@@ -255,6 +307,7 @@ class ControlLoop {
     if (status == StepStatus::ok) {
       limiter_.track(u);
       requested_ = u;
+      elsewhere_ = true;
       set_mode(LoopMode::running);
     }
     return status;
@@ -264,7 +317,8 @@ class ControlLoop {
   /// them, nothing changes.
   Check<S> adopt(const ControlLoop& fresh) {
     if (auto ok = observer_.adopt(fresh.observer_); !ok) return ok;
-    limiter_.adopt(fresh.limiter_);
+    limiter_.adopt(fresh.limiter_, output());
+    requested_ = output();
     // After a change of the divider the next update is one with a measurement.
     if (set_.divider != fresh.set_.divider) phase_ = 0;
     set_ = fresh.set_;
@@ -280,7 +334,7 @@ class ControlLoop {
     if (auto ok = observer_.set_step_time(seconds); !ok) return ok;
     const auto limiter = Limiter<S>::make(set_.limits, seconds);
     if (!limiter) return limiter.error();
-    limiter_.adopt(*limiter);
+    limiter_.adopt(*limiter, output());
     return {};
   }
 
@@ -288,8 +342,10 @@ class ControlLoop {
   [[nodiscard]] const Observer& observer() const noexcept { return observer_; }
   /// The observer, for its own members.
   [[nodiscard]] Observer& observer() noexcept { return observer_; }
-  /// The last output, after the limits, or the u that was reported as applied since.
-  [[nodiscard]] const S& output() const noexcept { return limiter_.last(); }
+  /// The last output, after the limits.
+  [[nodiscard]] S output() const noexcept { return limiter_.commanded(requested_); }
+  /// What the actuator holds: the last output, or the u that was reported as applied since.
+  [[nodiscard]] const S& held() const noexcept { return limiter_.last(); }
   /// The u requested by the law, before the limits.
   [[nodiscard]] const S& requested() const noexcept { return requested_; }
   /// Status of the observer at the last step.
@@ -298,14 +354,14 @@ class ControlLoop {
   [[nodiscard]] Lanes<LoopMode, S> mode() const noexcept { return mode_; }
   /// D: a measurement is due at every D-th step.
   [[nodiscard]] Lanes<int, S> measurement_divider() const noexcept { return set_.divider; }
-  /// The limits, and the output that they last let through.
+  /// The limits, and what the actuator holds.
   [[nodiscard]] const Limiter<S>& limiter() const noexcept { return limiter_; }
 
  private:
   friend struct detail::LaneAccess;
   friend struct detail::RecordAccess;
   static constexpr bool has_step_time = observer_traits<Observer>.varies_time;
-  static constexpr int data_members = 9;
+  static constexpr int data_members = 10;
   struct NoLimits {
     constexpr NoLimits() = default;
     constexpr explicit NoLimits(const Limits<S>&) {}
@@ -317,7 +373,7 @@ class ControlLoop {
     Lanes<std::uint16_t, S> missing_limit{};
     Lanes<std::uint16_t, S> divider{};
     Lanes<bool, S> watched{};
-    Lanes<bool, S> has_safe_input{};
+    Lanes<bool, S> hold_safe{};
     Lanes<bool, S> stay_safe{};
     [[no_unique_address]] std::conditional_t<has_step_time, Limits<S>, NoLimits> limits{};
   };
@@ -329,7 +385,7 @@ class ControlLoop {
              static_cast<std::uint16_t>((settings.missing.most + 1) * settings.measurement_divider),
              static_cast<std::uint16_t>(settings.measurement_divider),
              watched,
-             settings.missing.input.has_value(),
+             settings.missing.hold,
              settings.missing.stay,
              decltype(Set::limits)(settings.limits)},
         mode_(hold_samples > 0 ? LoopMode::start_hold : LoopMode::running),
@@ -339,14 +395,24 @@ class ControlLoop {
     set_mode(mode_);
     // The output before the first step is the hold input, or the value nearest to it within the
     // limits.
-    if (hold_samples > 0) limiter_.track(limiter_.within(set_.hold_input));
+    if (hold_samples > 0) limiter_.track(requested_ = limiter_.within(set_.hold_input));
+  }
+
+  /// u is commanded elsewhere.
+  StatusType take_over(S u) noexcept {
+    const auto good = is_finite(u);
+    limiter_.track(select(good, u, output()));
+    return detail::unless<S>(good, StepStatus::input_rejected);
   }
 
   /// One sample with a u from elsewhere.
-  void follow(S measured, S drive) noexcept {
-    if (mode_ == LoopMode::start_hold) set_mode(LoopMode::running);
+  void follow(S measured, S drive, StatusType told) noexcept {
+    if (mode_ == LoopMode::start_hold) mode_ = LoopMode::running;
     observe_specially<false>(measured, drive);
+    status_ = status_ | told;
     requested_ = limiter_.last();
+    elsewhere_ = true;
+    set_mode(mode_);
   }
 
   template <bool Advanced, class Law>
@@ -370,15 +436,30 @@ class ControlLoop {
 
   template <class Law>
   S put_out(Law law) noexcept {
+    if (elsewhere_) {  // u is commanded here again
+      elsewhere_ = false;
+      set_mode(mode_);
+    }
+    // Also where it is not used.
+    if (!law.takes()) status_ = status_ | StepStatus::reference_rejected;
     return limited(mode_ == LoopMode::running ? S(law(true)) : other_output());
   }
 
   ESOKIT_INLINE S limited(S wanted) noexcept {
-    // A bad reference or an overflow in the law: keeps the last output.
-    if (const auto good = is_finite(wanted); records<S> || !all(good)) [[unlikely]]
-      wanted = select(good, wanted, limiter_.last());
+    if constexpr (!records<S>) {  // what is written has it in its shell
+      if (const auto good = is_finite(wanted); !all(good)) [[unlikely]]
+        wanted = instead_of(wanted);
+    }
     requested_ = wanted;
     return limiter_(wanted);
+  }
+
+  /// The u for one that is not finite, by a bad reference or an overflow in the law: the last
+  /// output.
+  ESOKIT_COLD S instead_of(S wanted) noexcept {
+    const auto good = is_finite(wanted);
+    status_ = status_ | detail::unless<S>(good, StepStatus::reference_rejected);
+    return select(good, wanted, output());
   }
 
   template <bool Advanced>
@@ -419,7 +500,7 @@ class ControlLoop {
     judge_missing();
   }
 
-  void judge_missing() noexcept {
+  ESOKIT_COLD void judge_missing() noexcept {
     const int missed = observer_.missed();
     if (missed >= set_.missing_limit) {
       set_mode(LoopMode::safe);
@@ -430,15 +511,16 @@ class ControlLoop {
 
   /// The output if the law does not determine it.
   [[nodiscard]] ESOKIT_COLD S other_output() noexcept {
-    if (mode_ == LoopMode::safe) return set_.has_safe_input ? set_.safe_input : limiter_.last();
+    if (mode_ == LoopMode::safe) return set_.hold_safe ? output() : set_.safe_input;
     // The step in which the hold ends is still held.
     if (--hold_left_ == 0) set_mode(LoopMode::running);
     return set_.hold_input;
   }
 
-  void set_mode(Lanes<LoopMode, S> mode) noexcept {
+  ESOKIT_COLD void set_mode(Lanes<LoopMode, S> mode) noexcept {
     mode_ = mode;
-    special_ = !(mode == LoopMode::running) || !(set_.divider == 1) || set_.watched == true;
+    special_ = !(mode == LoopMode::running) || !(set_.divider == 1) || set_.watched == true ||
+               elsewhere_ == true;
   }
 
   [[nodiscard]] std::uint16_t next_phase() const noexcept {
@@ -450,6 +532,7 @@ class ControlLoop {
   [[no_unique_address]] Set set_;
   Lanes<LoopMode, S> mode_;
   Lanes<std::uint16_t, S> phase_{};
+  Lanes<bool, S> elsewhere_{false};  ///< u was commanded by something else since the last step
   Lanes<std::uint32_t, S> hold_left_;
   [[no_unique_address]] Limiter<S> limiter_;
   StatusType status_ = StepStatus::ok;

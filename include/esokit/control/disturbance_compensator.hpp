@@ -43,6 +43,11 @@ requires(detail::goes_into_a_loop<Observer>()) struct DisturbanceCompensatorConf
 /// disturbance, call `start(y, u)` and set the controller's output to `base_output()`: u then
 /// continues without a bump. Pass `output() - compensation()` to the controller's anti-windup as
 /// the applied u0.
+///
+/// If y is lost, dhat is no longer known, and the wrapped controller mostly reads the same sensor:
+/// so u goes to `missing.input`, by default to zero, whatever u0 is. If u0 does not depend on this
+/// sensor, put it out yourself in that mode, and say so by `track`. A u0 that is not finite is
+/// reported as `reference_rejected`, and u is kept.
 template <class Observer>
 requires(detail::goes_into_a_loop<Observer>()) class DisturbanceCompensator {
  public:
@@ -85,13 +90,11 @@ requires(detail::goes_into_a_loop<Observer>()) class DisturbanceCompensator {
 
   /// One sample. @param y measurement, NaN if missing @param base_output u0 of the wrapped
   /// controller @return u to be held until the next sample, within the limits
-  S update(S y, S base_output) noexcept {
-    return loop_.step(y, loop_.output(), asked(base_output));
-  }
+  S update(S y, S base_output) noexcept { return loop_.step(y, loop_.held(), asked(base_output)); }
 
   /// What the actuator held since the last sample, if it was not the last output: say it before
-  /// `update`. A u that is not finite changes nothing. @{
-  void applied(S u) noexcept { loop_.applied(u); }
+  /// `update`. @return ok, or input_rejected for a u that is not finite, which changes nothing @{
+  StatusOf<S> applied(S u) noexcept { return loop_.applied(u); }
   S update(S y, S base_output, S u) = delete;  // call applied(u) before update
   /// @}
 
@@ -173,8 +176,8 @@ requires(detail::goes_into_a_loop<Observer>()) class DisturbanceCompensator {
   }
   /// T, s.
   [[nodiscard]] S sample_time() const noexcept { return loop_.observer().sample_time(); }
-  /// The present u, within the limits.
-  [[nodiscard]] const S& output() const noexcept { return loop_.output(); }
+  /// The present u, within the limits, whatever is reported as applied.
+  [[nodiscard]] S output() const noexcept { return loop_.output(); }
   /// u0 + K dhat before the limits.
   [[nodiscard]] const S& requested() const noexcept { return loop_.requested(); }
   /// The limits of u.
@@ -205,7 +208,7 @@ requires(detail::goes_into_a_loop<Observer>()) class DisturbanceCompensator {
   }
   template <class O = Observer>
   requires(detail::LaneAccess::steps<O>) S update_advanced(const S& y, const S& base_output)
-  noexcept { return loop_.template step<true>(y, loop_.output(), asked(base_output)); }
+  noexcept { return loop_.template step<true>(y, loop_.held(), asked(base_output)); }
   /// @}
 
   DisturbanceCompensator(const Loop& loop, S gain) noexcept : loop_(loop), gain_(gain) {}
@@ -220,7 +223,9 @@ requires(detail::goes_into_a_loop<Observer>()) class DisturbanceCompensator {
     return base_output + unbounded_compensation();
   }
   ESOKIT_INLINE auto asked(S base_output) const noexcept {
-    return [this, base_output](bool) ESOKIT_INLINE_LAMBDA { return command(base_output); };
+    return detail::Asked{[this, base_output](bool)
+                             ESOKIT_INLINE_LAMBDA { return command(base_output); },
+                         [base_output] { return all(is_finite(base_output)); }};
   }
 
   Loop loop_;

@@ -75,7 +75,6 @@ requires(detail::is_a_plain_scalar<S>()) class Experiment {
 
   /// The same if the actuator reports what it held since the last sample.
   S update(S y, S u_applied) noexcept {
-    if (is_finite(u_applied)) limiter_.track(u_applied);
     if (finished()) return put_out(end_input());
     if (!is_finite(y) || !is_finite(u_applied)) return abort(AbortReason::bad_sample);
     if (count_ > 0) last_row_ = {S(count_ - 1) * config_.sample_time, u_applied, y_[0]};

@@ -86,7 +86,8 @@ requires(detail::is_a_plain_scalar<S>()) class GainProbe {
     const auto& observer = controller.observer();
     using Observer = std::remove_cvref_t<decltype(observer)>;
     static_assert(Observer::size == Size, "esokit: a probe has as many poles as the observer");
-    limiter_.track(observer.applied_input());
+    // The rate limit counts from what this returned, not from what the actuator reports.
+    if (!started_) limiter_.track(observer.applied_input());
     if (finished()) return limiter_(controller.output());
     const bool runs = controller.mode() == LoopMode::running;
     if (!started_) rest_ = y;

@@ -25,6 +25,10 @@ struct Limits {
 /// A step of rate x T that the digits of u cannot hold waits until it has become large enough, so
 /// the rate holds at any magnitude; it may be exceeded by one digit of u. Where a step is above
 /// 1024 digits of the larger magnitude limit nothing can be lost, and nothing is added to the work.
+///
+/// What was commanded and what the actuator held are two numbers: the rate limit counts from the
+/// first, an observer is driven by the second. An actuator that reports an offset, noise or a lag
+/// would otherwise move its own limit.
 template <Scalar S = double>
 class Limiter {
  public:
@@ -65,19 +69,18 @@ class Limiter {
   }
 
   /// The output nearest to `command` within the limits; stored as the last output.
-  /// @param command finite, as is everything computed from an observer's estimate
+  /// @param command finite
   constexpr S operator()(const S& command) noexcept { return settle(clamp(command)); }
 
   /// Ends a step. @param output what `clamp` gave for it @return the same
   constexpr S settle(S output) noexcept {
     if (rate_limited_ == false) {
-      last_ = output;
+      held_ = output;
       return output;
     }
     if (!(waits_ == false)) [[unlikely]]
       return settle_digits(output);
-    last_ = output;
-    reach(step_);
+    reach(output, step_);
     return output;
   }
 
@@ -91,24 +94,57 @@ class Limiter {
     return smaller(larger(u, lower_), upper_);
   }
 
-  /// Takes over at `output`, however far it is from the last one: the rate limit counts from there.
+  /// Takes over a u that was commanded elsewhere (by an operator): the rate limit counts from
+  /// there.
   constexpr void track(const S& output) noexcept {
-    last_ = output;
+    held_ = output;
     // Without a rate limit the bounds do not change.
     if (rate_limited_ == false) return;
-    reach(larger(S(step_ + waiting_), S(0.0)));
+    reach(output, larger(S(step_ + waiting_), S(0.0)));
   }
 
-  /// Takes over the limits of `fresh`; the last output is kept.
-  constexpr void adopt(const Limiter& fresh) noexcept {
-    const S last = last_, waiting = waiting_;
+  /// What the actuator held, as it reports. The limits of the next output do not depend on it.
+  constexpr void applied(const S& u) noexcept { held_ = u; }
+  /// The same for a caller that does not store what it asks for. @param again true if it was said
+  /// since the last output
+  constexpr void applied(const S& u, bool again) noexcept {
+    if (!again && rate_limited_ == false) commanded_ = held_;
+    held_ = u;
+  }
+
+  /// What the actuator holds: the last output, or what was reported since.
+  [[nodiscard]] constexpr const S& last() const noexcept { return held_; }
+
+  /// The last output, within the magnitude limits, whatever was reported since. @param requested
+  /// what was asked for then: without a rate limit nothing else is stored
+  [[nodiscard]] ESOKIT_COLD constexpr S commanded(const S& requested) const noexcept {
+    if constexpr (lane_count<S> == 1) {
+      return within(rate_limited_ ? commanded_ : requested);
+    } else {
+      S u = commanded_;
+      for (int i = 0; i < lane_count<S>; ++i) {
+        if (!rate_limited_[i]) u[i] = requested[i];
+      }
+      return within(u);
+    }
+  }
+
+  /// The same for a caller that says in `applied` what was said before. @param told whether
+  /// `applied` was said since the last output
+  [[nodiscard]] constexpr const S& commanded(bool told) const noexcept {
+    return told ? commanded_ : held_;
+  }
+
+  /// Takes over the limits of `fresh`; what is held is kept. @param command the last output, as
+  /// `commanded` gives it
+  constexpr void adopt(const Limiter& fresh, const S& command) noexcept {
+    const S held = held_, waiting = waiting_;
     *this = fresh;
     waiting_ = select(is_coarse(), S(0.0), waiting);
-    track(last);
+    track(command);
+    applied(held, false);
   }
 
-  /// The last output.
-  [[nodiscard]] constexpr const S& last() const noexcept { return last_; }
   /// Magnitude limits.
   /// @{
   [[nodiscard]] constexpr const S& lower() const noexcept { return lower_; }
@@ -124,7 +160,7 @@ class Limiter {
  private:
   friend struct detail::LaneAccess;
 
-  static constexpr int data_members = 9;
+  static constexpr int data_members = 10;
 
   Limiter(const Limits<S>& limits, const S& sample_time) noexcept
       : lower_(limits.lower),
@@ -150,18 +186,20 @@ class Limiter {
   /// `settle`, with what the step left over or took in advance: at most a digit of the output.
   ESOKIT_COLD constexpr S settle_digits(S output) noexcept {
     const S digit = detail::rounding<S>() * detail::absolute(output);
-    const S left = waiting_ + (step_ - detail::absolute(S(output - last_)));
-    // Further away than a step: the output was reported. And a lane may need no waiting.
+    const S left = waiting_ + (step_ - detail::absolute(S(output - commanded_)));
+    // Further away than a step: something else commanded it. And a lane may need no waiting.
     waiting_ = smaller(select(left < -digit, S(0.0), left), digit);
     waiting_ = select(is_coarse(), S(0.0), waiting_);
     track(output);
     return output;
   }
 
-  constexpr void reach(const S& step) noexcept {
-    low_ = larger(lower_, S(last_ - step));
-    high_ = smaller(upper_, S(last_ + step));
-    // A reported output may be beyond a magnitude limit by more than a step.
+  constexpr void reach(const S& from, const S& step) noexcept {
+    held_ = from;
+    commanded_ = from;
+    low_ = larger(lower_, S(from - step));
+    high_ = smaller(upper_, S(from + step));
+    // An operator's u may be beyond a magnitude limit by more than a step.
     low_ = smaller(low_, upper_);
     high_ = larger(high_, lower_);
   }
@@ -173,9 +211,10 @@ class Limiter {
   S lower_;
   S upper_;
   S step_;
-  S last_{};
+  S held_{};
   S low_;
   S high_;
+  S commanded_{};  ///< kept with a rate limit, or where held_ is another and nobody keeps it
   Lanes<bool, S> rate_limited_;
   Lanes<bool, S> waits_{};  ///< whether the digits of some u do not hold a step
 };

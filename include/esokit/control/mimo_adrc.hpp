@@ -41,6 +41,11 @@ requires(...&& detail::shifts_disturbance<Observers>()) struct MimoAdrcConfig {
   /// largest element of 1 so that units do not matter.
   S condition_limit = S(1000);
   Array<Limits<S>, channels> limits{};  ///< of each actuator
+
+  /// What to do when measurements are missing: `most` of each measurement, `input` or `hold` of
+  /// each actuator. If one measurement is missing for too long, all actuators go there: B0 couples
+  /// them. `stay` is said by any of them.
+  Array<MissingRule<S>, channels> missing{};
 };
 
 /// Control of y_i^(n_i) = d_i + (B0 u)_i, i = 1..q, B0 square and invertible: each channel has an
@@ -49,7 +54,8 @@ requires(...&& detail::shifts_disturbance<Observers>()) struct MimoAdrcConfig {
 ///
 /// Observer i gets the applied (B0 u)_i, so the limits of the q actuators cause no wind-up; while
 /// an actuator is at its limit, the channels are coupled through B0. A channel whose measurement is
-/// NaN only predicts, the others continue; a channel whose reference is NaN keeps its part of B0 u.
+/// NaN only predicts, the others continue, up to `missing.most` samples: then `mode()` is `safe`. A
+/// channel whose reference is NaN reports `reference_rejected` and keeps its part of B0 u.
 ///
 /// An actuator in the model of a channel is a lag of (B0 u)_i. This is correct if all actuators
 /// have the same lag, or if B0 does not couple them.
@@ -89,8 +95,7 @@ requires(...&& detail::shifts_disturbance<Observers>()) class MimoAdrc {
   /// One sample. @param y q x 1, NaN for a missing element @param reference r, q x 1
   /// @return u, q x 1, to be held until the next sample, within the limits
   Output update(const Output& y, const Output& reference) noexcept {
-    const Output before = output();
-    const Output drive = told_matrix_ * before;
+    const Output drive = told_matrix_ * held();
     told_matrix_ = input_matrix_;
     Output wanted;
     detail::unroll<channels>([&](auto i) {
@@ -104,17 +109,33 @@ requires(...&& detail::shifts_disturbance<Observers>()) class MimoAdrc {
         r = estimate(0) + observer.wrap(r - estimate(0));
       const S v =
           detail::by_present_gain(observer, S(std::get<channel>(laws_).control(estimate, r)));
-      wanted(row) = is_finite(v) ? v : S((input_matrix_ * before)(row));
+      wanted(row) = is_finite(v) ? v : kept(row);
     });
-    return put_out(inverse_ * wanted);
+    wanted = inverse_ * wanted;
+    if (special_ != 0) [[unlikely]]
+      wanted = specially(wanted);
+    return put_out(wanted);
   }
 
   /// What the actuators held since the last sample, if it was not the last output: say it before
-  /// `update`. One that is not finite keeps its last output. @{
-  void applied(const Output& u) noexcept {
+  /// `update`. The observers get it; a rate limit counts from the last output (right after `start`
+  /// or `hold` from this u). @return ok, or input_rejected if one is not finite, which keeps its
+  /// last output @{
+  StepStatus applied(const Output& u) noexcept {
+    StepStatus status = StepStatus::ok;
+    const bool theirs = (special_ & elsewhere) != 0;
     for (int i = 0; i < channels; ++i) {
-      if (is_finite(u(i))) limiters_[static_cast<std::size_t>(i)].track(u(i));
+      auto& limiter = limiters_[static_cast<std::size_t>(i)];
+      if (!is_finite(u(i))) status = StepStatus::input_rejected;
+      const S held = is_finite(u(i)) ? u(i) : limiter.last();
+      if (theirs) {
+        limiter.track(held);
+      } else {
+        limiter.applied(held, is_told());
+      }
     }
+    if (!theirs) special_ |= told;
+    return status;
   }
   Output update(const Output& y, const Output& reference,
                 const Output& u) = delete;  // call applied(u) before update
@@ -127,16 +148,22 @@ requires(...&& detail::shifts_disturbance<Observers>()) class MimoAdrc {
   requires(observer_traits<Observers>.gates_disturbance&&...)  //
       Output hold(const Output& y, const Output& u_applied)
   noexcept {
-    applied(u_applied);
-    const Output drive = told_matrix_ * output();
+    const Output before = output();
+    Output u;
+    for (int i = 0; i < channels; ++i) u(i) = is_finite(u_applied(i)) ? u_applied(i) : before(i);
+    track(u);
+    special_ = static_cast<unsigned char>(special_ | elsewhere);
+    const Output drive = told_matrix_ * u;
     told_matrix_ = input_matrix_;
     detail::unroll<channels>([&](auto i) {
+      constexpr auto channel = static_cast<std::size_t>(i);
       constexpr int row = i;
-      auto& observer = std::get<static_cast<std::size_t>(i)>(observers_);
+      auto& observer = std::get<channel>(observers_);
       observe<row>(y(row), observer.hold(S(drive(row))));
       observer.release();
+      if (!is_finite(u_applied(row))) statuses_[channel] |= StepStatus::input_rejected;
     });
-    return output();
+    return u;
   }
 
   /// Sets B0 from the next sample on: it applies to the next output of the law, and therefore to
@@ -148,7 +175,7 @@ requires(...&& detail::shifts_disturbance<Observers>()) class MimoAdrc {
   Check<S> set_input_matrix(const InputMatrix& input_matrix) noexcept {
     const auto inverse = inverted(input_matrix, condition_limit_);
     if (!inverse) return inverse.error();
-    if (!is_finite(S((input_matrix * output()).sum()))) return too_large(S(output()(0)));
+    if (!is_finite(S((input_matrix * held()).sum()))) return too_large(S(held()(0)));
     input_matrix_ = input_matrix;
     inverse_ = *inverse;
     return {};
@@ -168,7 +195,8 @@ requires(...&& detail::shifts_disturbance<Observers>()) class MimoAdrc {
     });
     if (status != StepStatus::ok) return status;
     observers_ = observers;
-    for (int i = 0; i < channels; ++i) limiters_[static_cast<std::size_t>(i)].track(u(i));
+    track(u);
+    special_ = elsewhere;
     return status;
   }
 
@@ -179,7 +207,7 @@ requires(...&& detail::shifts_disturbance<Observers>()) class MimoAdrc {
   /// The same with the settings of `fresh`, as returned by `make`: without design work, so it may
   /// run in an interrupt.
   Check<S> adopt(const MimoAdrc& fresh) {
-    const Output u = output();
+    const Output u = held();
     const Output drive = fresh.input_matrix_ * u;
     const Output moved = input_matrix_ * u - drive;
     Channels observers = observers_;
@@ -200,21 +228,32 @@ requires(...&& detail::shifts_disturbance<Observers>()) class MimoAdrc {
       }
     });
     if (!outcome) return outcome;
+    const Output commanded = output();
     auto limiters = limiters_;
-    for (std::size_t i = 0; i < channels; ++i) limiters[i].adopt(fresh.limiters_[i]);
+    for (std::size_t i = 0; i < channels; ++i) {
+      limiters[i].adopt(fresh.limiters_[i], commanded(static_cast<int>(i)));
+    }
+    const unsigned char special = special_;
     *this = fresh;
     observers_ = observers;
     limiters_ = limiters;
+    special_ = static_cast<unsigned char>(special | told);
     return {};
   }
 
   /// T of all channels, s.
   [[nodiscard]] S sample_time() const noexcept { return observer<0>().sample_time(); }
-  /// The present u, q x 1.
+  /// The present u, q x 1, whatever is reported as applied.
   [[nodiscard]] Output output() const noexcept {
     Output u;
-    for (int i = 0; i < channels; ++i) u(i) = limiters_[static_cast<std::size_t>(i)].last();
+    for (int i = 0; i < channels; ++i) {
+      u(i) = limiters_[static_cast<std::size_t>(i)].commanded(is_told());
+    }
     return u;
+  }
+  /// Whether u is determined by the law or by the rule for missing measurements.
+  [[nodiscard]] LoopMode mode() const noexcept {
+    return (special_ & safe) != 0 ? LoopMode::safe : LoopMode::running;
   }
 
   /// Observer of a channel, 0 .. q - 1, for its estimates.
@@ -248,6 +287,7 @@ requires(...&& detail::shifts_disturbance<Observers>()) class MimoAdrc {
 
  private:
   using Laws = std::tuple<AdrcLaw<Observers::order, S>...>;
+  struct Missing;
 
   MimoAdrc(const Channels& observers, const Laws& laws, const Array<Limiter<S>, channels>& limiters,
            const Config& config, const InputMatrix& inverse) noexcept
@@ -257,7 +297,14 @@ requires(...&& detail::shifts_disturbance<Observers>()) class MimoAdrc {
         input_matrix_(config.input_matrix),
         told_matrix_(config.input_matrix),
         inverse_(inverse),
-        condition_limit_(config.condition_limit) {}
+        condition_limit_(config.condition_limit) {
+    for (int i = 0; i < channels; ++i) {
+      const auto& missing = config.missing[static_cast<std::size_t>(i)];
+      safe_input_(i) = missing.input.value_or(S(0));
+      auto& rule = missing_[static_cast<std::size_t>(i)];
+      rule = {static_cast<std::uint16_t>(missing.most), missing.hold, missing.stay};
+    }
+  }
 
   template <int Channel>
   void observe(const S& y, const S& drive) noexcept {
@@ -265,12 +312,58 @@ requires(...&& detail::shifts_disturbance<Observers>()) class MimoAdrc {
     auto& observer = std::get<channel>(observers_);
     const StepStatus status = observer.update(y, drive);
     std::get<channel>(statuses_) = status;
+    if (status != StepStatus::ok) [[unlikely]]
+      after_trouble(observer, y, status, missing_[channel]);
+  }
+
+  template <class Observer>
+  ESOKIT_COLD void after_trouble(Observer& observer, const S& y, StepStatus status,
+                                 const Missing& rule) noexcept {
     // After a gap too long to bridge the observer starts in the steady state under the present u,
     // so that u does not jump.
-    if (has(status, StepStatus::restarted)) [[unlikely]] {
+    if (has(status, StepStatus::restarted)) {
       const S input = observer.applied_input();
       (void)observer.reset(observer.equilibrium(y, input));
     }
+    if (observer.missed() > rule.most) special_ |= safe;
+  }
+
+  /// What a channel keeps of B0 u if its law is not finite.
+  ESOKIT_COLD S kept(int row) noexcept {
+    statuses_[static_cast<std::size_t>(row)] |= StepStatus::reference_rejected;
+    return S((input_matrix_ * output())(row));
+  }
+
+  /// u where it is not the last output that the actuators held, or measurements are missing.
+  ESOKIT_COLD Output specially(Output wanted) noexcept {
+    bool stays = false;
+    for (const Missing& rule : missing_) stays = stays || rule.stay;
+    detail::unroll<channels>([&](auto i) {
+      stays = stays || std::get<static_cast<std::size_t>(i)>(observers_).missed() > 0;
+    });
+    if (!stays) special_ &= static_cast<unsigned char>(~safe);
+    const Output before = output();
+    for (int i = 0; i < channels; ++i) {
+      if ((special_ & safe) != 0) {
+        wanted(i) = missing_[static_cast<std::size_t>(i)].hold ? before(i) : safe_input_(i);
+      } else if (!is_finite(wanted(i))) {
+        wanted(i) = before(i);
+      }
+    }
+    special_ &= safe;
+    return wanted;
+  }
+
+  [[nodiscard]] bool is_told() const noexcept { return (special_ & told) != 0; }
+  /// What the actuators hold.
+  [[nodiscard]] Output held() const noexcept {
+    Output u;
+    for (int i = 0; i < channels; ++i) u(i) = limiters_[static_cast<std::size_t>(i)].last();
+    return u;
+  }
+  void track(const Output& u) noexcept {
+    for (int i = 0; i < channels; ++i) limiters_[static_cast<std::size_t>(i)].track(u(i));
+    special_ &= static_cast<unsigned char>(~told);
   }
 
   static Error<S> too_large(const S& u) {
@@ -355,6 +448,7 @@ requires(...&& detail::shifts_disturbance<Observers>()) class MimoAdrc {
         config, config.controller_bandwidths[Index], sample_time, std::get<Index>(observers))...};
     std::tuple limiters{
         (static_cast<void>(Index), Limiter<S>::make(config.limits[Index], sample_time))...};
+    std::tuple missing{detail::check_missing(config.missing[Index], config.limits[Index])...};
     const Error<S>* error = nullptr;
     int channel = -1;
     const auto look = [&](const auto& outcome, std::size_t i) {
@@ -365,6 +459,7 @@ requires(...&& detail::shifts_disturbance<Observers>()) class MimoAdrc {
     (look(std::get<Index>(observers), Index), ...);
     (look(std::get<Index>(laws), Index), ...);
     (look(std::get<Index>(limiters), Index), ...);
+    (look(std::get<Index>(missing), Index), ...);
     if (error != nullptr) {
       Error<S> named = *error;
       named.index = channel;
@@ -408,6 +503,17 @@ requires(...&& detail::shifts_disturbance<Observers>()) class MimoAdrc {
     return AdrcLaw<Order, S>::make({.gains = *gains, .input_gain = input_gain});
   }
 
+  /// Of a channel, see MissingRule.
+  struct Missing {
+    std::uint16_t most;
+    bool hold;
+    bool stay;
+  };
+  // Bits of special_.
+  static constexpr unsigned char safe = 1;
+  static constexpr unsigned char told = 2;       ///< `applied` was said since the last output
+  static constexpr unsigned char elsewhere = 4;  ///< and that was the caller's
+
   Channels observers_;
   Laws laws_;
   Array<Limiter<S>, channels> limiters_;
@@ -416,6 +522,9 @@ requires(...&& detail::shifts_disturbance<Observers>()) class MimoAdrc {
   InputMatrix inverse_;
   S condition_limit_;
   Array<StepStatus, channels> statuses_{};
+  Output safe_input_{};
+  Array<Missing, channels> missing_{};
+  unsigned char special_ = 0;
 };
 
 }  // namespace esokit

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdint>
 #include <esokit/control/adrc_law.hpp>
+#include <esokit/control/control_loop.hpp>
 #include <esokit/control/controller.hpp>
 #include <esokit/control/limiter.hpp>
 #include <esokit/core/check.hpp>
@@ -23,7 +24,14 @@ namespace esokit {
 namespace detail {
 
 /// What was told of the present sample.
-enum class PredictivePhase : unsigned char { prepared, measured, missing };
+enum class PredictivePhase : unsigned char {
+  started,  // and u is not yet one of the controller
+  prepared,
+  measured,
+  missing,
+  measured_and_applied,
+  missing_and_applied
+};
 
 }  // namespace detail
 
@@ -40,6 +48,7 @@ requires(detail::foretells<Observer>()) struct PredictiveAdrcConfig {
   Limits<S> limits{};                      ///< of the actuator
   S start_hold{};  ///< t_u >= 0, s: time after the start with u = 0 (within the limits), while
                    ///< the observer settles; rounded up to whole samples
+  MissingRule<S> missing{};  ///< what to do when measurements are missing
 };
 
 /// u = (v - dhat) / b0, the same as AdrcLaw after the observer's correction, but written as u_k =
@@ -62,12 +71,14 @@ requires(detail::foretells<Observer>()) struct PredictiveAdrcConfig {
 /// pass the reference of that sample to `set_reference`.
 ///
 /// If a measurement is NaN, infinite, too large, or an outlier for the observer's gate, u is
-/// computed from the prediction only and the sample counts as missing. With a bad reference the
-/// last u is kept.
+/// computed from the prediction only and the sample counts as missing. After more than
+/// `missing.most` in a row `mode()` is `safe`, and from the next sample on u goes to
+/// `missing.input`, by default to zero: see MissingRule for what to choose. With a bad reference
+/// the last u is kept, and `reference_rejected` reported.
 ///
 /// The actuator is assumed to hold what `control` returned. If it reports another value, before or
 /// after `prepare`, say `applied(u)`: the prediction is corrected by Gamma (u_reported -
-/// u_assumed) before the next correction.
+/// u_assumed) before the next correction. A rate limit counts from what `control` returned.
 ///
 /// Calls other than make and retune only multiply and add, except in the observer's gain law (the
 /// division of a filter, the power of fal). No call allocates, throws or locks.
@@ -103,7 +114,13 @@ requires(detail::foretells<Observer>()) class PredictiveAdrc {
     if (!limiter) return limiter.error();
     const auto hold = hold_samples(config.start_hold, observer->sample_time());
     if (!hold) return hold.error();
-    PredictiveAdrc controller(*observer, *law, *limiter, *hold);
+    Rules<S> rules;
+    const bool contain_zero = !(config.limits.lower > S(0.0)) && !(config.limits.upper < S(0.0));
+    rules.demand(*hold == 0 || contain_zero, "start_hold", config.start_hold,
+                 "must be left out, as its u = 0 is not within the limits");
+    if (!rules) return rules.error();
+    if (auto ok = detail::check_missing(config.missing, config.limits); !ok) return ok.error();
+    PredictiveAdrc controller(*observer, *law, *limiter, *hold, config.missing);
     for (const S& weight : controller.set_.weights) {
       if (!all(is_finite(weight))) {
         return Error<S>{"observer.sample_time", observer->sample_time(),
@@ -146,14 +163,23 @@ requires(detail::foretells<Observer>()) class PredictiveAdrc {
   /// Second phase. @param next_reference of the next sample: r, `{r, r1}` or a vector
   StepStatus prepare(const Reference& next_reference) noexcept {
     StepStatus status = StepStatus::ok;
-    if (phase_ == Phase::measured) status |= observer_.correct(measurement_);
+    S drive = output_;
+    if (phase_ == Phase::measured) {
+      status |= observer_.correct(measurement_);
+    } else [[unlikely]] {
+      if (phase_ == Phase::measured_and_applied) status |= observer_.correct(measurement_);
+      if (phase_ >= Phase::measured_and_applied) drive = limiter_.last();
+    }
     limiter_.settle(output_);
-    status |= observer_.predict(output_);
+    status |= observer_.predict(drive);
+    if (phase_ != Phase::measured || status != StepStatus::ok || mode_ != LoopMode::running)
+        [[unlikely]] {
+      judge();
+    }
     phase_ = Phase::prepared;
-    if (hold_left_ > 0) --hold_left_;
-    set_reference(next_reference);
     status_ = status;
-    return status;
+    set_reference(next_reference);
+    return status_;
   }
 
   /// Both phases at once, if the computing delay does not matter. @return u
@@ -171,17 +197,22 @@ requires(detail::foretells<Observer>()) class PredictiveAdrc {
     arm();
   }
 
-  /// What the actuator held since the last `control`, if it was not its u. A number that is not
-  /// finite is ignored. @{
+  /// What the actuator held since the last `control`, if it was not its u. @return ok, or
+  /// input_rejected for a number that is not finite, which changes nothing @{
   StepStatus applied(S u) noexcept {
-    const auto good = is_finite(u);
-    StepStatus status = all(good) ? StepStatus::ok : StepStatus::input_rejected;
-    u = select(good, u, output_);
-    output_ = u;
-    if (phase_ == Phase::prepared) {
+    if (!all(is_finite(u))) return StepStatus::input_rejected;
+    StepStatus status = StepStatus::ok;
+    if (phase_ == Phase::started) {
+      output_ = u;
       limiter_.track(u);
+    }
+    if (phase_ <= Phase::prepared) {
       status |= observer_.revise_input(u);
       arm();
+    } else {
+      limiter_.applied(u);
+      const bool missing = phase_ == Phase::missing || phase_ == Phase::missing_and_applied;
+      phase_ = missing ? Phase::missing_and_applied : Phase::measured_and_applied;
     }
     return status;
   }
@@ -194,9 +225,10 @@ requires(detail::foretells<Observer>()) class PredictiveAdrc {
     const StepStatus status = detail::start_at_rest(observer_, y, u);
     if (status != StepStatus::ok) return StepStatus::state_rejected;
     hold_left_ = 0;
+    mode_ = LoopMode::running;
     output_ = u;
     limiter_.track(u);
-    phase_ = Phase::prepared;
+    phase_ = Phase::started;
     set_reference(y);
     return status;
   }
@@ -206,6 +238,7 @@ requires(detail::foretells<Observer>()) class PredictiveAdrc {
     const StepStatus status = observer_.reset(y);
     if (status != StepStatus::ok) return status;
     hold_left_ = set_.hold;
+    mode_ = set_.hold > 0 ? LoopMode::start_hold : LoopMode::running;
     phase_ = Phase::prepared;
     arm();
     return status;
@@ -220,8 +253,7 @@ requires(detail::foretells<Observer>()) class PredictiveAdrc {
   Check<S> adopt(const PredictiveAdrc& fresh) {
     if (auto ok = observer_.adopt(fresh.observer_); !ok) return ok;
     set_ = fresh.set_;
-    limiter_.adopt(fresh.limiter_);
-    limiter_.track(output_);
+    limiter_.adopt(fresh.limiter_, output_);
     arm();
     return {};
   }
@@ -234,6 +266,8 @@ requires(detail::foretells<Observer>()) class PredictiveAdrc {
   [[nodiscard]] const S& output() const noexcept { return output_; }
   /// Status of the observer at the last sample.
   [[nodiscard]] StepStatus status() const noexcept { return status_; }
+  /// Whether u is determined by the law, the start hold or the rule for missing measurements.
+  [[nodiscard]] LoopMode mode() const noexcept { return mode_; }
   /// The next u if its measurement is missing, before the limits.
   [[nodiscard]] const S& blind_output() const noexcept { return next_.blind; }
   /// k_0 .. k_(n-1).
@@ -244,7 +278,7 @@ requires(detail::foretells<Observer>()) class PredictiveAdrc {
   using Phase = detail::PredictivePhase;
   friend struct detail::LaneAccess;
   friend struct detail::RecordAccess;
-  static constexpr int data_members = 10;
+  static constexpr int data_members = 11;
 
   /// What is known about the gain before the measurement.
   static constexpr GainKind kind = observer_traits<Observer>.gain_kind;
@@ -257,11 +291,17 @@ requires(detail::foretells<Observer>()) class PredictiveAdrc {
   static constexpr bool factored = kind == GainKind::factored;
 
   PredictiveAdrc(const Observer& observer, const AdrcLaw<order, S>& law, const Limiter<S>& limiter,
-                 std::uint32_t hold) noexcept
+                 std::uint32_t hold, const MissingRule<S>& missing) noexcept
       : limiter_(limiter),
         output_(limiter.last()),
+        mode_(hold > 0 ? LoopMode::start_hold : LoopMode::running),
         observer_(observer),
-        set_{.law = law, .hold = hold},
+        set_{.law = law,
+             .safe_input = missing.input.value_or(S(0.0)),
+             .hold = hold,
+             .missing_limit = static_cast<std::uint16_t>(missing.most + 1),
+             .hold_safe = missing.hold,
+             .stay_safe = missing.stay},
         hold_left_(hold) {
     // The weights include 1/b0 and the scaling T^i / i! of the chain.
     const S inverse = S(1.0) / law.input_gain();
@@ -358,8 +398,12 @@ requires(detail::foretells<Observer>()) class PredictiveAdrc {
         settle_for(set_.law.control(observer_.estimate(), reference));
       }
     }
-    if (hold_left_ > 0) [[unlikely]]
-      settle_for(S(0.0));
+    if (mode_ != LoopMode::running) [[unlikely]] {
+      if (!all(is_finite(next_.feed))) status_ |= StepStatus::reference_rejected;
+      settle_for(mode_ == LoopMode::start_hold ? S(0.0)
+                 : set_.hold_safe              ? output_
+                                               : set_.safe_input);
+    }
     // If this is not finite, u would be NaN with a measurement, and a NaN passes the limits.
     if (!all(is_finite(next_.blind)) || !all(is_finite(next_.offset)) ||
         !all(is_finite(next_.slope))) [[unlikely]] {
@@ -392,8 +436,22 @@ requires(detail::foretells<Observer>()) class PredictiveAdrc {
     next_.guard = observer_.finite_probe(next.slope);
   }
 
-  void settle_for_blind() noexcept {
-    settle_for(select(is_finite(next_.blind), next_.blind, limiter_.last()));
+  ESOKIT_COLD void settle_for_blind() noexcept {
+    if constexpr (!records<S>) {
+      if (!is_finite(next_.blind)) status_ |= StepStatus::reference_rejected;
+    }
+    settle_for(select(is_finite(next_.blind), next_.blind, output_));
+  }
+
+  /// Which u is next: after the prediction, when a measurement that is missing counts as two.
+  ESOKIT_COLD void judge() noexcept {
+    if (mode_ == LoopMode::start_hold && --hold_left_ == 0) mode_ = LoopMode::running;
+    const int missed = observer_.missed() - 1;
+    if (missed >= set_.missing_limit) {
+      mode_ = LoopMode::safe;
+    } else if (mode_ == LoopMode::safe && !set_.stay_safe && missed <= 0) {
+      mode_ = LoopMode::running;
+    }
   }
 
   /// The next u does not depend on y.
@@ -422,8 +480,9 @@ requires(detail::foretells<Observer>()) class PredictiveAdrc {
   } next_;
   Limiter<S> limiter_;
   S measurement_{};
-  S output_{};
+  S output_{};  ///< as it was commanded
   Phase phase_ = Phase::prepared;
+  LoopMode mode_;
 
   Observer observer_;
   /// What a retune replaces.
@@ -431,7 +490,11 @@ requires(detail::foretells<Observer>()) class PredictiveAdrc {
     AdrcLaw<order, S> law;
     Weights weights{};  ///< of the scaled states
     Weights feeds{};    ///< of the reference and its derivatives
+    S safe_input{};
     std::uint32_t hold{};
+    std::uint16_t missing_limit{};
+    bool hold_safe{};
+    bool stay_safe{};
   } set_;
   Weights reference_{};  ///< (r, r', .., r^(n)) of the next sample
   StepStatus status_ = StepStatus::ok;

@@ -3,13 +3,14 @@
 #pragma once
 
 #include <concepts>
+#include <cstdint>
 #include <esokit/core/lanes.hpp>
 #include <esokit/core/text.hpp>
 
 namespace esokit {
 
 /// Bit flags; `ok` is zero. A step of packs reports one status per lane, see `StatusOf`.
-enum class StepStatus : unsigned char {
+enum class StepStatus : std::uint16_t {
   ok = 0,
   /// y was NaN, infinite, or so large that the estimate would not be finite. It was not used: the
   /// step only predicted.
@@ -33,12 +34,16 @@ enum class StepStatus : unsigned char {
   /// An angle differed by more than a quarter of its period from what its motion so far predicts:
   /// its turn is uncertain, see WrappedOutput.
   turn_assumed = 128,
+  /// Of a controller: the reference (or u0 of a DisturbanceCompensator) was NaN, infinite or so
+  /// large that the law would not be finite. In a form that needs it u stayed as it was last
+  /// commanded.
+  reference_rejected = 256,
 };
 
 /// The flags of both.
 /// @{
 constexpr StepStatus operator|(StepStatus a, StepStatus b) noexcept {
-  return static_cast<StepStatus>(static_cast<unsigned char>(a) | static_cast<unsigned char>(b));
+  return static_cast<StepStatus>(static_cast<std::uint16_t>(a) | static_cast<std::uint16_t>(b));
 }
 
 constexpr StepStatus& operator|=(StepStatus& a, StepStatus b) noexcept { return a = a | b; }
@@ -46,7 +51,7 @@ constexpr StepStatus& operator|=(StepStatus& a, StepStatus b) noexcept { return 
 
 /// True if `flag` is set in `status`.
 constexpr bool has(StepStatus status, StepStatus flag) noexcept {
-  return (static_cast<unsigned char>(status) & static_cast<unsigned char>(flag)) != 0;
+  return (static_cast<std::uint16_t>(status) & static_cast<std::uint16_t>(flag)) != 0;
 }
 
 /// What a step with scalar S reports: a status, for a pack one per lane.
@@ -72,6 +77,22 @@ constexpr bool has(const PerLane<StepStatus, Count>& status, StepStatus flag) no
 }
 /// @}
 
+namespace detail {
+
+/// `flag` where a test of an S failed, lane by lane.
+template <class S, class Mask>
+constexpr StatusOf<S> unless(const Mask& good, StepStatus flag) noexcept {
+  if constexpr (lane_count<S> == 1) {
+    return all(good) ? StepStatus::ok : flag;
+  } else {
+    StatusOf<S> each;
+    for (int i = 0; i < lane_count<S>; ++i) each[i] = good[i] ? StepStatus::ok : flag;
+    return each;
+  }
+}
+
+}  // namespace detail
+
 /// A status can be written to a stream, see has_text.
 template <>
 inline constexpr bool has_text<StepStatus> = true;
@@ -81,7 +102,7 @@ template <class Stream, std::same_as<StepStatus> Value>
 requires detail::WritesText<Stream> Stream& operator<<(Stream& out, Value status) {
   constexpr const char* names[] = {"measurement_rejected", "input_rejected", "prediction_dropped",
                                    "gap_bridged",          "restarted",      "state_rejected",
-                                   "outlier_rejected",     "turn_assumed"};
+                                   "outlier_rejected",     "turn_assumed",   "reference_rejected"};
   if (status == StepStatus::ok) out << "ok";
   const char* separator = "";
   unsigned flag = 1;

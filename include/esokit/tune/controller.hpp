@@ -88,12 +88,15 @@ std::vector<std::complex<double>> placed_poles(const TuneModel& model, const Tun
 /// So that fewer types are needed, every design with one level becomes a LinearEso with the poles
 /// of the design (with m = 1 or 2, or with the lag in its model). Its gains equal those of the
 /// design's `code` up to rounding. A cascade becomes a CascadeEso.
+/// @param missing what to do when measurements are missing; if it does not say where u goes, that
+/// is
+///        `model.safe_input()`
 /// @return error for a model of another order, for a design that knows more than the lag (use its
 ///         `code`), or from `make`
 /// @tparam S scalar of the controller, double or float
 template <int Order, class S = double, class Visit>
-Check<double> with_controller(const TuneModel& model, const TunedDesign& design,
-                              const Visit& visit) {
+Check<double> with_controller(const TuneModel& model, const TunedDesign& design, const Visit& visit,
+                              const MissingRule<double>& missing = {}) {
   Rules<double> rules;
   rules.all_of(model.validate())
       .demand(model.order == Order,
@@ -121,6 +124,10 @@ Check<double> with_controller(const TuneModel& model, const TunedDesign& design,
         config.gains->begin(), [](double gain) { return static_cast<S>(gain); });
     config.limits.lower = static_cast<S>(model.u_min);
     config.limits.upper = static_cast<S>(model.u_max);
+    config.missing = {.most = missing.most, .stay = missing.stay, .hold = missing.hold};
+    if (missing.input || !missing.hold) {
+      config.missing.input = static_cast<S>(missing.input.value_or(model.safe_input()));
+    }
     config.soften = design.settings.soften;
     auto controller = detail::ControllerOf<Config>::make(config);
     if (!controller) return detail::as_double(controller.error());

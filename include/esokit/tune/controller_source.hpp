@@ -57,7 +57,9 @@ struct ControllerSource {
     return "using Observer = " + observer + ";\n" +
            "auto controller = esokit::Adrc<Observer>::make({.observer = {" + config + "},\n    " +
            law + ",\n    .limits = {.lower = " + source(model.u_min) +
-           ", .upper = " + source(model.u_max) + "}, " + soften + "});\n";
+           ", .upper = " + source(model.u_max) +
+           "},\n    .missing = {.input = " + source(model.safe_input()) +
+           "},  // u if y stays away: choose\n    " + soften + "});\n";
   }
 };
 inline ControllerSource controller_source(const TunedDesign& d, const TuneModel& model) {

@@ -42,6 +42,11 @@ struct TuneModel {
   double u_min = 0.0;                      ///< limits of the actuator
   double u_max = 0.0;                      ///< upper limit, above u_min
 
+  /// u nearest to zero within the limits: what a design states for a lost sensor. Choose your own.
+  [[nodiscard]] double safe_input() const noexcept {
+    return u_min > 0.0 ? u_min : u_max < 0.0 ? u_max : 0.0;
+  }
+
   /// Order 3: Coulomb friction on y'', unit of y''; 0: none. Left out: not known, and the design is
   /// played with up to a quarter of what half the range of u makes of y'' in ten latencies.
   std::optional<double> friction{};
