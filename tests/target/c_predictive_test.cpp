@@ -83,6 +83,10 @@ void predicts(
     config.controller_bandwidth = V(4);
     config.limits = {V(-3), V(2.5), V(60)};
     config.start_hold = V(0.1);
+    // A lost measurement ends in a stated u, in the last one, or, left out, in zero.
+    config.missing.most = 6;
+    if (seed % 3 == 0) config.missing.input = V(-0.5);
+    if (seed % 3 == 1) config.missing.hold = true;
     change(config);
     C mine = C::make(config).value();
     InTwoPhases<V> in_c(folder, to_c(mine, {.name = "loop"}).value());
@@ -94,6 +98,8 @@ void predicts(
     int lost = 0;
     int limited = 0;
     int outliers = 0;
+    int safe = 0;
+    int bad_references = 0;
     int of_status[64] = {};
     for (int k = 0; k < samples && !testing::Test::HasFailure(); ++k) {
       plant.set_disturbance(2 * std::sin(0.01 * k));
@@ -119,7 +125,9 @@ void predicts(
       const auto status = static_cast<unsigned>(mine.prepare(next));
       EXPECT_EQ(status, in_c.prepare(next)) << k;
       ++of_status[status % 64];
-      outliers += status >= 64;
+      outliers += status / 64 % 2 == 1;
+      safe += mine.mode() == LoopMode::safe;
+      bad_references += status >= 256;
       report();
       if (random.index(2000) == 0) {
         EXPECT_EQ(static_cast<unsigned>(mine.start(y, held)), in_c.start(y, held)) << k;
@@ -140,6 +148,8 @@ void predicts(
       EXPECT_EQ(outliers > samples / 2000, config.observer.outlier_threshold > V(0));
     }
     EXPECT_GT(limited, samples / 50);
+    EXPECT_GT(safe, samples / 500);
+    EXPECT_GT(bad_references, samples / 4000);
     for (const StepStatus status :
          {StepStatus::measurement_rejected, StepStatus::gap_bridged, StepStatus::restarted}) {
       EXPECT_GT(of_status[static_cast<int>(status)], samples / 2000);

@@ -28,7 +28,10 @@ class FixedInC {
     const bool opens = !code.settings.empty();
     static int count = 0;
     folder.write("eso.h", code.header);
-    folder.write("eso.c", code.source);
+    const std::string probe = "unsigned eso_status(const eso_state *o)";
+    folder.write("eso.c", code.source + (controls ? "\n" + probe + ";\n" + probe +
+                                                         "\n{\n  return o->status;\n}\n"
+                                                   : ""));
     const std::string out = folder.file("eso" + std::to_string(count++) + ".so");
     if (!runs(compiler + " -O2 -shared -fPIC -DESO_SELF_TEST" + std::string(strict) + "-o " + out +
               " " + folder.file("eso.c"))) {
@@ -42,6 +45,7 @@ class FixedInC {
       find(miss, "eso_update_without_measurement");
       find(applied, "eso_applied");
       find(start, "eso_start");
+      find(status, "eso_status");
     } else {
       find(update, "eso_update");
       find(predict, "eso_predict");
@@ -72,7 +76,8 @@ class FixedInC {
   // Of a controller.
   std::int32_t (*control)(void*, Y, Y) = nullptr;
   std::int32_t (*miss)(void*, Y) = nullptr;
-  void (*applied)(void*, std::int32_t) = nullptr;
+  unsigned (*applied)(void*, std::int32_t) = nullptr;
+  unsigned (*status)(const void*) = nullptr;
   unsigned (*start)(void*, Y, std::int32_t) = nullptr;
   // Of settings in a struct, two sets of which are in the files.
   unsigned (*adopt)(void*, const void*) = nullptr;

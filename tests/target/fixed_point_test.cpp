@@ -313,8 +313,78 @@ TEST(FixedPoint, ALimitOfRateBelowOneCountKeepsItsRemainder) {
     // The step is rounded down to 2^-12 counts; of what it adds up to nothing is lost.
     EXPECT_NEAR(u, k * 409.0 / 4096, 0.5 + 1e-9) << k;
   }
-  c.applied(c.state.data(), 7);
+  // What the actuator reports moves no limit: it counts from what was put out.
+  for (int k = 5001; k <= 9000; ++k) {
+    const bool far = k % 3 == 0;
+    EXPECT_EQ(c.applied(c.state.data(), far ? -3000 : u + 7), far ? 2u : 0u);
+    u = c.control(c.state.data(), 0, 2000);
+    EXPECT_NEAR(u, k * 409.0 / 4096, 0.5 + 1e-9) << k;
+  }
+  EXPECT_EQ(c.start(c.state.data(), 0, 7), 0u);  // an operator's u is the last one
   EXPECT_NEAR(c.control(c.state.data(), 0, 2000), 7, 1);
+}
+
+/// An r outside of its range is reported at each sample, and its end followed, in any mode.
+TEST(FixedPoint, AReferenceOutOfItsRangeIsReported) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  auto config = servo_loop();
+  config.missing.most = 5;
+  const auto made = to_fixed_c(Servo::make(config).value(), servo()).value();
+  const Folder folder;
+  FixedInC<std::int32_t> c(folder, made.code, "gcc -std=c99", true);
+  FixedInC<std::int32_t> other(folder, made.code, "gcc -std=c99", true);
+  ASSERT_TRUE(c.loaded() && other.loaded());
+  const std::int32_t most = servo().y.most;
+  for (int k = 0; k < 200; ++k) {
+    const bool lost = k >= 100 && k < 150;
+    for (const std::int32_t sign : {1, -1}) {
+      const std::int32_t given = sign * (k % 2 == 0 ? most + 1 : 2000000000);
+      const auto u = lost ? c.miss(c.state.data(), given) : c.control(c.state.data(), 3, given);
+      const auto end = lost ? other.miss(other.state.data(), sign * most)
+                            : other.control(other.state.data(), 3, sign * most);
+      EXPECT_EQ(u, end) << k;
+      EXPECT_EQ(c.status(c.state.data()) & 32u, 32u) << k;
+      EXPECT_EQ(other.status(other.state.data()) & 32u, 0u) << k;
+    }
+    // Without a stated u it is zero.
+    if (k > 120 && lost) {
+      EXPECT_EQ(c.miss(c.state.data(), 0), 0);
+      other.miss(other.state.data(), 0);
+    }
+  }
+}
+
+/// A lost measurement ends in zero, in the stated u, or, by name, in the last one.
+TEST(FixedPoint, ALostMeasurementEndsInADeclaredInput) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  for (const int kind : {0, 1, 2}) {
+    auto config = servo_loop();
+    config.missing.most = 5;
+    if (kind == 1) config.missing.input = -2.0;
+    config.missing.hold = kind == 2;
+    const auto options = servo();
+    const auto made = to_fixed_c(Servo::make(config).value(), options).value();
+    const Folder folder;
+    FixedInC<std::int32_t> c(folder, made.code, "gcc -std=c99", true);
+    ASSERT_TRUE(c.loaded());
+    std::int32_t u = 0;
+    for (int k = 0; k < 100; ++k) u = c.control(c.state.data(), 0, 20);
+    EXPECT_GT(u, 0);
+    for (int k = 0; k < 200; ++k) {
+      (void)c.applied(c.state.data(), u + 5);
+      const std::int32_t next = c.miss(c.state.data(), 20);
+      if (k > 5 && kind == 2) {
+        EXPECT_EQ(next, u) << k;
+      }
+      u = next;
+    }
+    const auto stated = static_cast<std::int32_t>(std::lround(-2.0 / options.u.unit));
+    if (kind < 2) {
+      EXPECT_EQ(u, kind == 1 ? stated : 0);
+    } else {
+      EXPECT_NE(u, 0);
+    }
+  }
 }
 
 /// Missing samples, against the C++ observer: what it does is done here, but for the rounding.

@@ -158,7 +158,7 @@ void controls_changed(std::uint64_t seed, const Change& change) {
     Told<C, Observer> told(gain, block.find("loop_set_input_gain") != std::string::npos);
     constexpr bool guarded = Told<C, Observer>::guarded;
     Samples samples(told.names() + "y no_y r u_held starts reports " + (guarded ? "holds " : "") +
-                    ": u status mode start_status" + estimate_names(Observer::size));
+                    ": u status mode start_status report_status" + estimate_names(Observer::size));
     ChainPlant plant(C::order, 0.0078125, gain, 1.5);
     Random random(seed++ + asked("ESOKIT_WRITTEN_SEED", 0));
     V r(1);
@@ -184,25 +184,28 @@ void controls_changed(std::uint64_t seed, const Change& change) {
       // Before all else, as the block does; w after a start.
       if constexpr (guarded) told.tell(controller, observer, samples, random);
       if (starts) start_status = static_cast<unsigned>(controller.start(y, held));
-      if (reports) controller.applied(held);
+      const auto report_status =
+          reports ? static_cast<unsigned>(controller.applied(held)) : 0u;
       if constexpr (!guarded) told.tell(controller, observer, samples, random);
       bool done = false;
+      V u{};
       if constexpr (guarded) {
         done = holds;
-        if (holds) controller.hold(y, given, held);
+        if (holds) u = controller.hold(y, given, held);
       }
       if (done) {
       } else if (lost > 0) {
-        controller.update_without_measurement(given);
+        u = controller.update_without_measurement(given);
       } else {
-        controller.update(y, given);
+        u = controller.update(y, given);
       }
       samples.number(y).count(lost > 0).number(given).number(held).count(starts).count(reports);
       if (guarded) samples.count(holds);
-      samples.number(controller.output())
+      samples.number(u)
           .count(static_cast<unsigned>(controller.status()))
           .count(static_cast<unsigned>(controller.mode()))
           .count(start_status)
+          .count(report_status)
           .estimates(controller.observer());
       odd_ones += controller.status() != StepStatus::ok;
     }
@@ -357,7 +360,7 @@ void predicts_in_text(std::uint64_t seed) {
     }
     C controller = C::make(settings).value();
     const auto block = to_structured_text(controller, {.name = "loop"}).value();
-    Samples samples("y no_y next_r u_held starts reports : u status start_status" +
+    Samples samples("y no_y next_r u_held starts reports : u status mode start_status report_status" +
                     estimate_names(Observer::size));
     ChainPlant plant(C::order, 0.0078125, gain, 1.5);
     Random random(seed++ + asked("ESOKIT_WRITTEN_SEED", 0));
@@ -374,11 +377,13 @@ void predicts_in_text(std::uint64_t seed) {
       const bool starts = random.index(80) == 0;
       const bool reports = random.index(30) == 0;
       if (starts) start_status = static_cast<unsigned>(controller.start(y, held));
-      if (reports) (void)controller.applied(held);
+      const auto report_status =
+          reports ? static_cast<unsigned>(controller.applied(held)) : 0u;
       const V u = lost > 0 ? controller.control_without_measurement() : controller.control(y);
       const auto status = static_cast<unsigned>(controller.prepare(given));
       samples.number(y).count(lost > 0).number(given).number(held).count(starts).count(reports);
-      samples.number(u).count(status).count(start_status).estimates(controller.observer());
+      samples.number(u).count(status).count(static_cast<unsigned>(controller.mode()));
+      samples.count(start_status).count(report_status).estimates(controller.observer());
     }
     interprets(block, samples);
   }

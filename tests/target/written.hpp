@@ -272,7 +272,7 @@ class InC {
                              "unsigned loop_size(void) { return sizeof(loop_state); }\n"
                              "unsigned loop_probe(const loop_state *o);\n"
                              "unsigned loop_probe(const loop_state *o) { return ") +
-                     (is_controller ? "o->status + 256u * o->mode + " : "") +
+                     (is_controller ? "o->status + 512u * o->mode + " : "") +
                      "65536u * o->gap; }\n",
                  compiler) {
     if (!loaded()) return;
@@ -323,15 +323,15 @@ class InC {
   void release() { release_(state_.data()); }
   bool takes_gain() const { return gain_ != nullptr; }
   bool set_input_gain(V b) { return gain_(state_.data(), b); }
-  void set_trust(V trust) { trust_(state_.data(), trust); }
-  void applied(V u) { applied_(state_.data(), u); }
+  unsigned set_trust(V trust) { return trust_(state_.data(), trust); }
+  unsigned applied(V u) { return applied_(state_.data(), u); }
   unsigned start(V y, V u) { return start_(state_.data(), y, u); }
   unsigned observe(V y, V u) { return observe_(state_.data(), y, u); }
   unsigned predict(V u) { return predict_(state_.data(), u); }
   unsigned correct(V y) { return correct_(state_.data(), y); }
   unsigned reset(V y) { return reset_(state_.data(), y); }
   V estimate(unsigned row) { return estimate_(state_.data(), row); }
-  /// status + 256 mode + 65536 gap
+  /// status + 512 mode + 65536 gap
   unsigned probe() { return probe_(state_.data()); }
   int self_test(V tolerance) { return self_test_(tolerance); }
   /// Its bytes: a copy of them may be put back.
@@ -344,8 +344,8 @@ class InC {
   unsigned (*start_)(void*, V, V) = nullptr;
   V (*update_)(void*, V, V) = nullptr;
   V (*miss_)(void*, V) = nullptr;
-  void (*applied_)(void*, V) = nullptr;
-  void (*trust_)(void*, V) = nullptr;
+  unsigned (*applied_)(void*, V) = nullptr;
+  unsigned (*trust_)(void*, V) = nullptr;
   void (*pin_)(void*, std::uint8_t) = nullptr;
   V (*hold_)(void*, V, V) = nullptr;
   V (*hold_with_)(void*, V, V, V) = nullptr;
@@ -371,7 +371,7 @@ inline std::uint64_t asked(const char* name, std::uint64_t usual) {
 }
 
 struct Seen {
-  int odd = 0, limited = 0, safe = 0;
+  int odd = 0, limited = 0, safe = 0, bad_references = 0;
   int of_status[64] = {};
 };
 
@@ -453,6 +453,7 @@ Seen compare(const C& fresh, InC<typename C::scalar_type>& in_c, double input_ga
   V r(1);
   int lost = 0;
   int held = 0;
+  int bad_for = 0;  // samples with such references
   double u = 0;
   for (int k = 0; k < samples; ++k) {
     plant.set_disturbance(2 * std::sin(0.01 * k));
@@ -471,9 +472,11 @@ Seen compare(const C& fresh, InC<typename C::scalar_type>& in_c, double input_ga
     if (random.index(150) == 0) y = anything<V>(random);
     if constexpr (requires { controller.observer().set_trust(y); }) {
       if (random.index(50) == 0) {
-        const V trust = random.index(2) == 0 ? V(1) : static_cast<V>(random.uniform(-0.2, 1.2));
-        controller.observer().set_trust(trust);
-        in_c.set_trust(trust);
+        const V trust = random.index(9) == 0   ? anything<V>(random)
+                        : random.index(2) == 0 ? V(1)
+                                               : static_cast<V>(random.uniform(-0.2, 1.2));
+        EXPECT_EQ(static_cast<unsigned>(controller.observer().set_trust(trust)),
+                  in_c.set_trust(trust));
       }
       tell_guard(controller, controller.observer(), in_c, random, input_gain);
       if (random.index(100) == 0) held = random.index(6);
@@ -481,7 +484,9 @@ Seen compare(const C& fresh, InC<typename C::scalar_type>& in_c, double input_ga
     tell_measured(controller, in_c, random, k);
     V given = r;
     if constexpr (!requires { controller.gains(); }) given = (r - y) / static_cast<V>(input_gain);
-    if (random.index(400) == 0) given = anything<V>(random);
+    if (bad_for > 0 || random.index(400) == 0) given = anything<V>(random);
+    if (bad_for > 0) --bad_for;
+    if (random.index(1000) == 0) bad_for = random.index(30);
     if (held > 0) {
       --held;
       const V under = random.index(10) == 0 ? anything<V>(random) : static_cast<V>(0.9 * u);
@@ -498,10 +503,12 @@ Seen compare(const C& fresh, InC<typename C::scalar_type>& in_c, double input_ga
       EXPECT_TRUE(equal_bits(mine, its)) << "sample " << k << ", held";
     } else if (random.index(30) == 0) {
       const V told = random.index(10) == 0 ? anything<V>(random) : static_cast<V>(0.9 * u);
-      controller.applied(told);
-      controller.update(y, given);
-      in_c.applied(told);
-      in_c.update(y, given);
+      for (int i = random.index(3); i >= 0; --i) {  // again and again, also after a start or a hold
+        const V then = i > 0 ? static_cast<V>(random.uniform(-3, 3)) : told;
+        EXPECT_EQ(static_cast<unsigned>(controller.applied(then)), in_c.applied(then)) << k;
+      }
+      const V mine = controller.update(y, given);
+      EXPECT_TRUE(equal_bits(mine, in_c.update(y, given))) << "sample " << k << ", reported";
     } else if (random.index(100) == 0) {
       controller.update_without_measurement(given);
       in_c.miss(given);
@@ -509,8 +516,11 @@ Seen compare(const C& fresh, InC<typename C::scalar_type>& in_c, double input_ga
       const V at = random.index(4) == 0 ? anything<V>(random) : static_cast<V>(plant.output());
       const V under = random.index(4) == 0 ? anything<V>(random) : static_cast<V>(u);
       EXPECT_EQ(static_cast<unsigned>(controller.start(at, under)), in_c.start(at, under)) << k;
-      controller.update(y, given);
-      in_c.update(y, given);
+      if (random.index(2) == 0) {
+        EXPECT_EQ(static_cast<unsigned>(controller.applied(under)), in_c.applied(under)) << k;
+      }
+      const V mine = controller.update(y, given);
+      EXPECT_TRUE(equal_bits(mine, in_c.update(y, given))) << "sample " << k << ", started";
     } else {
       const V mine = controller.update(y, given);
       const V its = in_c.update(y, given);
@@ -519,14 +529,15 @@ Seen compare(const C& fresh, InC<typename C::scalar_type>& in_c, double input_ga
     u = static_cast<double>(controller.output());
     const unsigned told = in_c.probe();
     const auto status = static_cast<unsigned>(controller.status());
-    EXPECT_EQ(told % 256, status) << "sample " << k;
-    EXPECT_EQ(told / 256 % 256, static_cast<unsigned>(controller.mode())) << "sample " << k;
+    EXPECT_EQ(told % 512, status) << "sample " << k;
+    EXPECT_EQ(told / 512 % 128, static_cast<unsigned>(controller.mode())) << "sample " << k;
     EXPECT_EQ(told / 65536, static_cast<unsigned>(controller.observer().missed()))
         << "sample " << k;
     compare_estimates(controller.observer(), in_c, k);
     seen.odd += status != 0;
     seen.limited += !equal_bits(controller.output(), controller.requested());
     seen.safe += controller.mode() == LoopMode::safe;
+    seen.bad_references += has(controller.status(), StepStatus::reference_rejected);
     ++seen.of_status[status % 64];
     if (testing::Test::HasFailure()) return seen;
   }
@@ -554,6 +565,7 @@ void equals_changed(int samples, std::uint64_t seed, const std::string& compiler
     const Seen seen = compare(controller, in_c, input_gain, samples, seed++);
     EXPECT_GT(seen.odd, samples / 100);
     EXPECT_GT(seen.limited, samples / 10);
+    EXPECT_GT(seen.bad_references, samples / 4000);
     // Of fewer measurements more have to be lost.
     EXPECT_GT(seen.safe, samples / (500 * divider));
     for (const StepStatus status :

@@ -159,6 +159,7 @@ class Limiter {
 
  private:
   friend struct detail::LaneAccess;
+  friend struct detail::RecordAccess;
 
   static constexpr int data_members = 10;
 

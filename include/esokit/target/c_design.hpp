@@ -157,7 +157,8 @@ class CDesign {
     text_.feature("ESOKIT_SOFTENS", d.softens);
     text_.feature("ESOKIT_DIVIDED", d.loop.divider > 1);
     text_.feature("ESOKIT_STAYS_SAFE", d.loop.stays_safe);
-    text_.feature("ESOKIT_SAFE_INPUT", d.loop.has_safe_input);
+    text_.feature("ESOKIT_HOLDS_SAFE", d.loop.holds_safe);
+    text_.feature("ESOKIT_WAITS", d.waits);
     text_.feature("ESOKIT_MONITORED", d.options.watched);
     text_.feature("ESOKIT_SETTINGS", d.options.settings_in_struct);
     text_.feature("ESOKIT_TABLE", gains_stand);
@@ -197,7 +198,13 @@ class CDesign {
     text_.count("DIVIDER", static_cast<std::size_t>(d.loop.divider));
     text_.count("MISSING_LIMIT", d.loop.missing_limit);
     text_.count("HOLD_SAMPLES", d.predictive ? d.hold : d.loop.hold_left);
-    text_.constant("FIRST_MODE", d.loop.hold_left > 0 ? "1u" : "0u");
+    const bool holds = d.predictive ? d.hold > 0 : d.loop.hold_left > 0;
+    text_.feature("ESOKIT_HOLDS_AT_START", holds);
+    text_.constant("FIRST_MODE", holds ? "1u" : "0u");
+    text_.constant("FIRST_PHASE", d.loop.elsewhere ? "5u" : "0u");
+    text_.count("FIRST_SPECIAL", static_cast<std::size_t>((holds ? 1 : 0) + (d.loop.told ? 2 : 0) +
+                                                          (d.loop.elsewhere ? 4 : 0)));
+    number("FIRST_KEPT", d.loop.kept);
     number("HOLD_INPUT", d.loop.hold_input);
     number("SAFE_INPUT", d.loop.safe_input);
     text_.count("LAW_START", d.law.start);

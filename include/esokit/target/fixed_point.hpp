@@ -441,10 +441,12 @@ class FixedText {
       rate = "  if (u > (o->u_last + " + step + ")) {\n    u = o->u_last + " + step + ";\n  }\n" +
              "  if (u < (o->u_last - " + step + ")) {\n    u = o->u_last - " + step + ";\n  }\n";
     }
-    const std::string clamp_r = wraps ? ""
-                                      : "  if (r > " + y_most + ") {\n    r = " + y_most +
-                                            ";\n  }\n  if (r < -" + y_most + ") {\n    r = -" +
-                                            y_most + ";\n  }\n";
+    const std::string flagged =
+        ";\n    o->status = (uint8_t)(o->status | $NAME_REFERENCE_REJECTED);\n  }\n";
+    const std::string clamp_r =
+        wraps ? ""
+              : "  if (r > " + y_most + ") {\n    r = " + y_most + flagged + "  if (r < -" + y_most +
+                    ") {\n    r = -" + y_most + flagged;
     std::string gain;
     for (const std::int32_t one_gain : gains_) {
       gain += (gain.empty() ? "" : ", ") + std::to_string(one_gain);
@@ -521,7 +523,7 @@ class FixedText {
               {"$LEAVE_SAFE", loop.stays_safe ? ""
                                               : "  if ((o->mode == $NAME_SAFE) && (o->gap < 1u)) "
                                                 "{\n    o->mode = $NAME_RUNNING;\n  }\n"},
-              {"$SAFE_INPUT", loop.has_safe_input ? fine(loop.safe_input) : "o->u_last"},
+              {"$SAFE_INPUT", loop.holds_safe ? "o->u_last" : fine(loop.safe_input)},
               {"$HOLD_INPUT", text_of(d_.hold_counts() * one)},
               {"$START_FINE", text_of(d_.start_held() * one)},
               {"$START_HELD", text_of(d_.start_held())},

@@ -28,6 +28,7 @@ extern "C" {
 #define $NAME_INPUT_REJECTED 2u /* u was outside its range: the end of the range was used */
 #define $NAME_GAP_BRIDGED 8u /* samples were missing before this one */
 #define $NAME_RESTARTED 16u /* too many samples were missing */
+#define $NAME_REFERENCE_REJECTED 32u /* r was outside its range: the end of the range was used */
 #define $NAME_SATURATED 128u /* in a gap a state left its range and was held there */
 
 /* The value of a count of an estimate. */
@@ -110,8 +111,9 @@ unsigned $name_start($name_state *o, $Y_TYPE y, int32_t u);
 int32_t $name_update($name_state *o, $Y_TYPE y, $Y_TYPE r);
 /* The same without a measurement. */
 int32_t $name_update_without_measurement($name_state *o, $Y_TYPE r);
-/* What the actuator really held, before the next update; only if it differs from what update gave. */
-void $name_applied($name_state *o, int32_t u);
+/* What the actuator really held, before the next update; only if it differs from what update gave.
+ * A limit of rate counts from what update gave. Returns a status. */
+unsigned $name_applied($name_state *o, int32_t u);
 )";
 
 /// The header of an observer.
@@ -350,10 +352,10 @@ $NAME_APART static int32_t put_out_held($name_state *o)
 
 static int32_t put_out($name_state *o, $Y_TYPE reference)
 {
-$OF_R  if (o->mode != $NAME_RUNNING) {
+$OF_R$CLAMP_R  if (o->mode != $NAME_RUNNING) {
     return put_out_held(o);
   }
-$CLAMP_R  return limited(o, law(o, r));
+  return limited(o, law(o, r));
 }
 
 /* The whole step where a sample is missing or bad. */
@@ -374,19 +376,6 @@ $INIT  (void)rest_at(o, 0, 0);
   o->status = 0u;
 }
 
-static void take_held($name_state *o, int32_t u)
-{
-  int32_t held = u;
-  if (held > $U_MOST) {
-    held = $U_MOST;
-  }
-  if (held < -$U_MOST) {
-    held = -$U_MOST;
-  }
-  o->u_held = held;
-  o->u_last = held * $ONE;
-}
-
 unsigned $name_start($name_state *o, $Y_TYPE given, int32_t u)
 {
   unsigned status;
@@ -394,7 +383,8 @@ $OF_Y_RESET$REFUSE_Y  if (((uint32_t)u + $U_MOSTu) > $U_TWICEu) {
     return $NAME_INPUT_REJECTED;
   }
   status = rest_at(o, $Y_ABSOLUTE, u);
-$NEW_Y  take_held(o, u);
+$NEW_Y  o->u_held = u;
+  o->u_last = u * $ONE;
   o->mode = $NAME_RUNNING;
   return status;
 }
@@ -409,9 +399,19 @@ $NEW_Y  o->status = 0u;
 $LEAVE_SAFE  return put_out(o, r);
 }
 
-void $name_applied($name_state *o, int32_t u)
+unsigned $name_applied($name_state *o, int32_t u)
 {
-  take_held(o, u);
+  unsigned status = 0u;
+  o->u_held = u;
+  if (u > $U_MOST) {
+    o->u_held = $U_MOST;
+    status = $NAME_INPUT_REJECTED;
+  }
+  if (u < -$U_MOST) {
+    o->u_held = -$U_MOST;
+    status = $NAME_INPUT_REJECTED;
+  }
+  return status;
 }
 
 int32_t $name_update_without_measurement($name_state *o, $Y_TYPE r)

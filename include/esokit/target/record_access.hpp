@@ -2,6 +2,7 @@
 /// RecordAccess: what is private in a controller and an observer, and is recorded apart.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -14,6 +15,7 @@
 #include <esokit/model/sampled_model.hpp>
 #include <esokit/target/recorded_numbers.hpp>
 #include <esokit/target/recorder.hpp>
+#include <iterator>
 #include <limits>
 #include <string>
 #include <tuple>
@@ -38,6 +40,10 @@ struct RecordAccess {
   template <class C>
   static auto& loop(C& c) noexcept {
     return c.loop_;
+  }
+  template <class C>
+  static auto& limiter_of(C& c) noexcept {
+    return c.loop_.limiter_;
   }
   /// u of the law for the present estimate, before the limits; as if no start hold were left.
   template <class C, class S>
@@ -69,13 +75,17 @@ struct RecordAccess {
   }
   template <class Loop>
   static LoopRules rules(const Loop& loop) noexcept {
+    const bool told = loop.held() < loop.output() || loop.held() > loop.output();
     return {loop.hold_left_,
             loop.set_.missing_limit,
             loop.set_.divider,
-            loop.set_.has_safe_input,
+            loop.set_.hold_safe,
             loop.set_.stay_safe,
             static_cast<double>(loop.set_.hold_input),
-            static_cast<double>(loop.set_.safe_input)};
+            static_cast<double>(loop.set_.safe_input),
+            loop.elsewhere_,
+            told && !loop.elsewhere_,
+            static_cast<double>(loop.output())};
   }
 
   /// Gains, those of the law, and limits, with the beginning of their names. @param c a controller
@@ -87,10 +97,11 @@ struct RecordAccess {
     };
     if constexpr (requires { c.loop_; }) {
       take(c.loop_.limiter_, "limit");
-      const Number* last = &c.loop_.limiter_.last();
-      const Number* waiting = &c.loop_.limiter_.waiting();
-      std::erase_if(found,
-                    [&](const auto& one) { return one.first == last || one.first == waiting; });
+      const auto& limiter = c.loop_.limiter_;
+      const Number* state[] = {&limiter.held_, &limiter.waiting_, &limiter.commanded_};
+      std::erase_if(found, [&state](const auto& one) {
+        return std::find(std::begin(state), std::end(state), one.first) != std::end(state);
+      });
       if constexpr (requires { c.law_; }) {
         take(c.law_, "law");
         take(c.weights_, "law");
@@ -171,15 +182,17 @@ struct RecordAccess {
       c.arm_by(next);
       return armed<Numbers>(c);
     });
-    add("arm_hold", "", false, [](auto& c, const auto&) {
+    add("arm_at", "u", true, [](auto& c, const auto& in) {
       c.look_ahead();
-      c.settle_for(Number(0.0));
-      return Numbers{};
+      const Number feed = c.next_.feed;
+      c.settle_for(in[0]);
+      return Numbers{feed};
     });
-    add("arm_blind", "", false, [](auto& c, const auto&) {
+    add("arm_blind", "", true, [](auto& c, const auto&) {
       c.look_ahead();
+      const Number blind = c.next_.blind;
       c.settle_for_blind();
-      return Numbers{};
+      return Numbers{blind};
     });
     using Gains = Array<ScaledGain<size, Number>, Observer::levels>;
     if constexpr (runs != RunningLaw::none) {
@@ -232,6 +245,17 @@ struct RecordAccess {
   template <class C>
   static unsigned hold_left(const C& c) noexcept {
     return c.hold_left_;
+  }
+  /// Of a controller in two phases.
+  template <class C>
+  static LoopRules rules_of_phases(const C& c) noexcept {
+    LoopRules rules;
+    rules.missing_limit = c.set_.missing_limit;
+    rules.holds_safe = c.set_.hold_safe;
+    rules.stays_safe = c.set_.stay_safe;
+    rules.safe_input = static_cast<double>(c.set_.safe_input);
+    rules.elsewhere = c.phase_ == decltype(c.phase_)::started;
+    return rules;
   }
   template <class C>
   static const auto& limiter(const C& c) noexcept {

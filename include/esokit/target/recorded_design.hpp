@@ -455,9 +455,12 @@ template <class Bare, class BareObserver>
   maker.add("limit", "u", true, [](auto& c, const Numbers& in) {
     return Numbers{Access::limited(Access::loop(c), in[0])};
   });
-  maker.add("take_applied", "u", false, [](auto& c, const Numbers& in) {
-    Access::loop(c).applied(in[0]);
+  maker.add("take_over", "u", false, [](auto& c, const Numbers& in) {
+    Access::limiter_of(c).track(in[0]);
     return Numbers{};
+  });
+  maker.add("within", "u", true, [](auto& c, const Numbers& in) {
+    return Numbers{Access::limiter_of(c).within(in[0])};
   });
   if (design.softens) {
     maker.add("harden", "", false, [](auto& c, const Numbers&) {
@@ -467,8 +470,8 @@ template <class Bare, class BareObserver>
   }
   const auto name_of = [](const auto& c, const Number* at) -> std::string {
     // The limiter keeps the bounds of the next output behind the last.
-    const Number* behind = &c.output();
-    for (const char* name : {"u_last", "u_low", "u_high"}) {
+    const Number* behind = &c.limiter().last();
+    for (const char* name : {"u_last", "u_low", "u_high", "u_command"}) {
       if (at == behind++) return name;
     }
     return at == &c.requested() ? "u_asked" : at == &c.limiter().waiting() ? "u_waiting" : "";
@@ -556,6 +559,7 @@ Expected<RecordedDesign, Error<typename C::scalar_type>> recorded_design(
   design.predictive = true;
   design.law = RecordAccess::law_numbers(controller.observer());
   design.hold = RecordAccess::hold_left(controller);
+  design.loop = RecordAccess::rules_of_phases(controller);
   design.lower = static_cast<double>(RecordAccess::limiter(controller).lower());
   design.upper = static_cast<double>(RecordAccess::limiter(controller).upper());
   take_rate(design, RecordAccess::limiter(controller));

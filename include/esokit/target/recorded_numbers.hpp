@@ -37,10 +37,13 @@ struct LoopRules {
   unsigned hold_left = 0;
   unsigned missing_limit = 0;
   int divider = 1;
-  bool has_safe_input = false;
+  bool holds_safe = false;
   bool stays_safe = false;
   double hold_input = 0;
   double safe_input = 0;
+  bool elsewhere = false;  ///< the last u was commanded by something else
+  bool told = false;       ///< the actuator holds another than the last, which is
+  double kept = 0;
 };
 
 /// An OutlierGate: its settings, and what it has seen.

@@ -21,7 +21,7 @@ $COMMENT   FUNCTION_BLOCK $name is at the end: call it once in each T = $TIME s;
 
    status, the sum of: 1 y was NaN, infinite or too large, 2 u was too large, 4 the next good y
    restarts, 8 samples were missing before this one, 16 restarted because too many were missing,
-   32 start or reset refused: y is not finite or too large$FLAGS. *)
+   32 start or reset refused: y is not finite or too large$FLAGS$OF_R. *)
 
 )";
 
@@ -30,8 +30,12 @@ inline constexpr const char* st_tell_measured = R"(IF NOT no_w THEN
   done := $name_measured(o := o, w := w);
 END_IF;
 )";
-inline constexpr const char* st_tell_guard = R"(done := $name_set_trust(o := o, trust := trust);
-done := $name_set_pin(o := o, where := UINT_TO_UDINT(pin));
+inline constexpr const char* st_tell_guard = R"(flags := $name_set_trust(o := o, trust := trust);
+guard_status := UDINT_TO_UINT(flags);
+flags := $name_set_pin(o := o, where := UINT_TO_UDINT(pin));
+IF flags <> 0 THEN
+  guard_status := UDINT_TO_UINT(flags);
+END_IF;
 )";
 inline constexpr const char* st_tell_gain = R"(IF b0 <> b0_taken THEN
   IF $name_set_input_gain(o := o, b := b0) THEN
@@ -47,8 +51,10 @@ inline constexpr const char* st_starts = R"(IF starts THEN
   flags := $name_start(o := o, y := y, u := u_held);
   start_status := UDINT_TO_UINT(flags);
 END_IF;
+report_status := 0;
 IF reports THEN
-  $REPORT
+  flags := $name_applied(o := o, u := u_held);
+  report_status := UDINT_TO_UINT(flags);
 END_IF;
 )";
 
@@ -67,6 +73,7 @@ ELSE
 END_IF;
 flags := $name_prepare(o := o, next_r := next_r);
 status := UDINT_TO_UINT(flags);
+mode := UDINT_TO_UINT(o.mode);
 )";
 inline constexpr const char* st_observer = R"($HOLDIF resets THEN
   flags := $name_reset(o := o, y := y);
@@ -166,15 +173,19 @@ inline StructuredText structured_text(const RecordedDesign& design) {
     block.input("u_held : $real", "what the actuator held, if starts or reports");
     block.input("starts : BOOL",
                 "TRUE: takes over a plant at rest at y under u_held, before the sample");
-    block.input("reports : BOOL", "TRUE: the actuator held u_held instead of u, before the sample");
+    block.input("reports : BOOL",
+                "TRUE: the actuator held u_held instead of u, before the sample; a limit of rate "
+                "counts from u");
     block.output("u : $real", "to be held until the next sample");
     block.output("start_status : UINT");
+    block.output("report_status : UINT");
   } else {
     block.input("u : $real", "what the actuator held since the last sample");
     block.input("resets : BOOL", "TRUE: restarts at (y, 0, .., 0) instead");
   }
-  if (controls) {
-    block.output(std::string("mode : UINT := ") + (design.loop.hold_left > 0 ? "1" : "0"),
+  if (controls || design.predictive) {
+    const unsigned holds = controls ? design.loop.hold_left : design.hold;
+    block.output(std::string("mode : UINT := ") + (holds > 0 ? "1" : "0"),
                  "0: the law, 1: the start hold, 2: too many measurements are missing");
   }
   block.output("status : UINT");
@@ -192,6 +203,7 @@ inline StructuredText structured_text(const RecordedDesign& design) {
     block.input("holds : BOOL",
                 controls ? "TRUE: something else holds the plant under u_held at this sample"
                          : "TRUE: something else holds the plant");
+    block.output("guard_status : UINT", "2: trust or pin is none, the last one counts");
     block.body += st_tell_guard;
     if (block.translator.has(name + "_set_input_gain")) {
       const std::string gain = number(design.input_gain);
@@ -216,7 +228,6 @@ inline StructuredText structured_text(const RecordedDesign& design) {
     block.body += st_tell_measured;
   }
   block.body += controls ? st_controller : design.predictive ? st_predictive : st_observer;
-  const std::string report = design.predictive ? "flags" : "done";
   const std::string hold = std::string("IF holds THEN\n  u := $name_hold(o := o, y := y, ") +
                            (design.error_based ? "r := r, " : "") + "u := u_held);\nELSIF";
   block.own("flags : UDINT");
@@ -238,8 +249,7 @@ inline StructuredText structured_text(const RecordedDesign& design) {
         "missed := UDINT_TO_UINT(o.gap);\n";
   }
   const bool gates = design.gate.threshold > 0 || design.law.watches;
-  block.body = filled(block.body, {{"$REPORT", report + " := $name_applied(o := o, u := u_held);"},
-                                   {"$HOLD", !guards    ? (controls ? "IF" : "")
+  block.body = filled(block.body, {{"$HOLD", !guards    ? (controls ? "IF" : "")
                                              : controls ? hold
                                                         : st_hold_observer}});
   StructuredText all = block.text(filled(
@@ -248,6 +258,9 @@ inline StructuredText structured_text(const RecordedDesign& design) {
                                            "otherwise than before: its turn is uncertain"
                   : gates                ? ",\n   64 y was refused as an outlier"
                                          : ""},
+       {"$OF_R", controls || design.predictive
+                     ? ",\n   256 r was NaN, infinite or too large: u is as it was"
+                     : ""},
        {"$TIME", number(design.sample_time)},
        {"$GAIN", number(design.input_gain)}}));
   if (design.options.settings_in_struct) {

@@ -19,10 +19,25 @@ R"esokit("
 #endif
 #endif
 #if ESOKIT_CONTROLLER
+/* Bits of `special`. */
+#define OTHER_MODE 1u
+#define TOLD 2u /* u_last is what was reported */
+#define ELSEWHERE 4u /* u was commanded by something else */
+#define IN_TROUBLE 8u /* this sample */
+
+/* The last u, as it was commanded. */
+static real commanded(const esokit_state *o)
+{
+  real u = ((o->special & TOLD) != 0u) ? o->u_kept : o->u_last;
+  (void)within(o, u, &u);
+  return u;
+}
+
 static void judge_missing(esokit_state *o)
 {
   if (o->gap >= MISSING_LIMIT) {
     o->mode = ESOKIT_SAFE;
+    o->special = (uint8_t)(o->special | OTHER_MODE);
   }
 #if !ESOKIT_STAYS_SAFE
   if ((o->mode == ESOKIT_SAFE) && (o->gap < DIVIDER)) {
@@ -52,16 +67,26 @@ static real wanted(esokit_state *o, real r)
   return u;
 }
 
-static real put_out(esokit_state *o, real r)
+/* The last u for one that is not finite. */
+static real instead(esokit_state *o)
+{
+  o->status = (uint16_t)(o->status | ESOKIT_REFERENCE_REJECTED);
+  return commanded(o);
+}
+
+static real wanted_specially(esokit_state *o, real r)
 {
   real u;
+  if (!is_finite(r)) {
+    o->status = (uint16_t)(o->status | ESOKIT_REFERENCE_REJECTED);
+  }
   if (o->mode == ESOKIT_RUNNING) {
     u = wanted(o, r);
   } else if (o->mode == ESOKIT_SAFE) {
-#if ESOKIT_SAFE_INPUT
-    u = SAFE_INPUT;
+#if ESOKIT_HOLDS_SAFE
+    u = commanded(o);
 #else
-    u = o->u_last;
+    u = SAFE_INPUT;
 #endif
   } else {
     o->hold_left = o->hold_left - 1u;
@@ -69,6 +94,24 @@ static real put_out(esokit_state *o, real r)
       o->mode = ESOKIT_RUNNING;
     }
     u = HOLD_INPUT;
+  }
+  if (!is_finite(u)) {
+    u = instead(o);
+  }
+  o->special = (o->mode != ESOKIT_RUNNING) ? OTHER_MODE : 0u;
+  return u;
+}
+
+static real put_out(esokit_state *o, real r)
+{
+  real u;
+  if (o->special != 0u) {
+    u = wanted_specially(o, r);
+  } else {
+    u = wanted(o, r);
+    if (!is_finite(u)) {
+      u = instead(o);
+    }
   }
   (void)limit(o, u, &u);
   return u;
@@ -80,9 +123,11 @@ void esokit_init(esokit_state *o)
 #if ESOKIT_DIVIDED
   o->phase = 0u;
 #endif
+  o->u_kept = FIRST_KEPT;
   o->hold_left = HOLD_SAMPLES;
   o->gap = 0u;
   o->mode = FIRST_MODE;
+  o->special = FIRST_SPECIAL;
   o->status = 0u;
 }
 
@@ -121,7 +166,7 @@ unsigned esokit_start(esokit_state *o, real y, real u)
     *o = before;
     return ESOKIT_STATE_REJECTED;
   }
-  (void)take_applied(o, u);
+  (void)take_over(o, u);
 #if ESOKIT_SOFTENS
   (void)harden(o);
 #endif
@@ -130,16 +175,13 @@ unsigned esokit_start(esokit_state *o, real y, real u)
 #endif
   o->gap = 0u;
   o->mode = ESOKIT_RUNNING;
+  o->special = ELSEWHERE;
   return 0u;
 }
 
-/* The observer's part of a sample. */
-static void take_sample(esokit_state *o, real measured, real given)
+static void after_trouble(esokit_state *o, real measured, unsigned status)
 {
-#if ESOKIT_DIVIDED
-  const bool planned = (o->gap + 1u) == DIVIDER;
-#endif
-  unsigned status = observe_update(o, measured, given);
+  o->special = (uint8_t)(o->special | IN_TROUBLE);
   if ((status & ESOKIT_RESTARTED) != 0u) {
 #if ESOKIT_GUARDED
     const real held = applied_by_present(o);
@@ -157,12 +199,24 @@ static void take_sample(esokit_state *o, real measured, real given)
     (void)rests;
 #endif
   }
+}
+
+/* The observer's part of a sample. */
+static void take_sample(esokit_state *o, real measured, real given)
+{
+#if ESOKIT_DIVIDED
+  const bool planned = (o->gap + 1u) == DIVIDER;
+#endif
+  unsigned status = observe_update(o, measured, given);
+  if (status != 0u) {
+    after_trouble(o, measured, status);
+  }
 #if ESOKIT_DIVIDED
   if (planned && (status == ESOKIT_GAP_BRIDGED)) {
     status = 0u;
   }
 #endif
-  o->status = (uint8_t)status;
+  o->status = (uint16_t)status;
   judge_missing(o);
 }
 
@@ -174,7 +228,8 @@ static void skip_sample(esokit_state *o, real given)
     o->phase = 0u;
   }
 #endif
-  o->status = (uint8_t)observe_predict(o, given);
+  o->special = (uint8_t)(o->special | IN_TROUBLE);
+  o->status = (uint16_t)observe_predict(o, given);
   judge_missing(o);
 }
 
@@ -202,33 +257,54 @@ real esokit_update_without_measurement(esokit_state *o, real r)
   return put_out(o, r);
 }
 
-void esokit_applied(esokit_state *o, real u)
+unsigned esokit_applied(esokit_state *o, real u)
 {
-  (void)take_applied(o, u);
+  if (!is_finite(u)) {
+    return ESOKIT_INPUT_REJECTED;
+  }
+  if ((o->special & ELSEWHERE) != 0u) {
+    (void)take_over(o, u);
+  } else {
+    if ((o->special & TOLD) == 0u) {
+      o->u_kept = o->u_last;
+      o->special = (uint8_t)(o->special | TOLD);
+    }
+    o->u_last = u;
+  }
+  return 0u;
 }
 
 #if ESOKIT_GUARDED
 static real hold_sample(esokit_state *o, real measured, real u)
 {
-  real given;
+  const bool good = is_finite(u);
+  real given = u;
 #if ESOKIT_SOFTENS
   (void)harden(o);
 #endif
-  (void)take_applied(o, u);
+  if (!good) {
+    given = commanded(o);
+  }
+  (void)take_over(o, given);
   if (o->mode == ESOKIT_START_HOLD) {
     o->mode = ESOKIT_RUNNING;
   }
+  o->special = ELSEWHERE;
   given = hold_guards(o);
 #if ESOKIT_DIVIDED
   if (o->phase != 0u) {
     skip_sample(o, given);
-    release_guards(o);
-    return o->u_last;
+  } else {
+    o->phase = 1u;
+    take_sample(o, measured, given);
   }
-  o->phase = 1u;
-#endif
+#else
   take_sample(o, measured, given);
+#endif
   release_guards(o);
+  if (!good) {
+    o->status = (uint16_t)(o->status | ESOKIT_INPUT_REJECTED);
+  }
 #if ESOKIT_MONITORED
   o->u_asked = o->u_last;
 #endif
@@ -253,8 +329,13 @@ bool esokit_adopt(esokit_state *o, const esokit_settings *settings)
 {
   const bool is_ours = settings->design == DESIGN_MARK;
   if (is_ours) {
+    const real held = o->u_last;
+    const real u = commanded(o);
     o->settings = settings;
-    (void)take_applied(o, o->u_last);
+    (void)take_over(o, u);
+    o->u_kept = u;
+    o->u_last = held;
+    o->special = (uint8_t)(o->special | TOLD);
   }
   return is_ours;
 }

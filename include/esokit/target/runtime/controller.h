@@ -26,6 +26,9 @@ extern "C" {
 #define ESOKIT_GAP_BRIDGED 8u /* samples were missing before this one */
 #define ESOKIT_RESTARTED 16u /* too many samples were missing */
 #define ESOKIT_STATE_REJECTED 32u /* start: y is not finite or too large */
+#if ESOKIT_CONTROLLER || ESOKIT_PREDICTIVE
+#define ESOKIT_REFERENCE_REJECTED 256u /* r was NaN, infinite or too large: u is as it was */
+#endif
 #if ESOKIT_GATED || ESOKIT_WATCHED
 #define ESOKIT_OUTLIER_REJECTED 64u /* y was too far from what was expected */
 #endif
@@ -45,7 +48,7 @@ typedef struct {
 extern const esokit_settings esokit_DESIGN_SET;
 
 #endif
-#if ESOKIT_CONTROLLER
+#if ESOKIT_CONTROLLER || ESOKIT_PREDICTIVE
 /* `mode`: what determines u. */
 #define ESOKIT_RUNNING 0u
 #define ESOKIT_START_HOLD 1u
@@ -134,18 +137,24 @@ typedef struct {
 #endif
 #if ESOKIT_PREDICTIVE
   real measurement;
+  real u_held; /* what was reported before prepare */
+#endif
+#if ESOKIT_CONTROLLER
+  real u_kept; /* the last u of update, if u_last is what was reported since */
 #endif
 #if ESOKIT_CONTROLLER || ESOKIT_PREDICTIVE
   uint32_t hold_left; /* samples of the start hold */
 #endif
   uint16_t gap; /* samples since the last measurement that was taken */
+#if ESOKIT_CONTROLLER || ESOKIT_PREDICTIVE
+  uint16_t status;
+  uint8_t mode;
+#endif
 #if ESOKIT_PREDICTIVE
-  uint8_t phase; /* 1: y was told, 2: it is missing */
-  uint8_t status;
+  uint8_t phase; /* 1: y was told, 2: it is missing, 3 and 4: and u, 5: started */
 #endif
 #if ESOKIT_CONTROLLER
-  uint8_t mode;
-  uint8_t status;
+  uint8_t special; /* 0: u is that of the law, and nothing else was said */
 #endif
 } esokit_state;
 
@@ -159,8 +168,10 @@ unsigned esokit_start(esokit_state *o, real y, real u);
 real esokit_update(esokit_state *o, real y, real r);
 /* The same without a measurement. */
 real esokit_update_without_measurement(esokit_state *o, real r);
-/* What the actuator really held, before the next update; only if it differs from what update gave. */
-void esokit_applied(esokit_state *o, real u);
+/* What the actuator really held, before the next update; only if it differs from what update gave.
+ * The observer gets it; a limit of rate counts from what update gave (after start: from this u).
+ * Returns a status. */
+unsigned esokit_applied(esokit_state *o, real u);
 #elif ESOKIT_PREDICTIVE
 /* Takes over a plant at rest at y under u; the reference is y. Returns a status. */
 unsigned esokit_start(esokit_state *o, real y, real u);
@@ -174,7 +185,8 @@ real esokit_control_without_measurement(esokit_state *o);
 unsigned esokit_prepare(esokit_state *o, real next_r);
 /* Both at once. */
 real esokit_update(esokit_state *o, real y, real next_r);
-/* What the actuator really holds; only if it is not what control gave. Returns a status. */
+/* What the actuator really holds; only if it is not what control gave. A limit of rate counts from
+ * what control gave (after start: from this u). Returns a status. */
 unsigned esokit_applied(esokit_state *o, real u);
 #else
 /* Restarts at (y, 0, .., 0). Returns a status. */
@@ -199,15 +211,15 @@ void esokit_measured(esokit_state *o, const real w[W_COUNT]);
 
 #endif
 #if ESOKIT_GUARDED
-/* From the next correction on, those of the disturbance count so much, 0 .. 1. */
-void esokit_set_trust(esokit_state *o, real trust);
+/* From the next correction on, those of the disturbance count so much, 0 .. 1. Returns a status. */
+unsigned esokit_set_trust(esokit_state *o, real trust);
 
 /* At which limit an actuator of unknown output is. */
 #define ESOKIT_PIN_FREE 0u
 #define ESOKIT_PIN_UPPER 1u
 #define ESOKIT_PIN_LOWER 2u
 #define ESOKIT_PIN_EITHER 3u /* by the sign of u */
-void esokit_set_pin(esokit_state *o, uint8_t where);
+unsigned esokit_set_pin(esokit_state *o, uint8_t where); /* returns a status */
 
 #if ESOKIT_CONTROLLER
 /* Instead of update, for a plant that something else holds under u: y is followed, the

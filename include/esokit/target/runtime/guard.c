@@ -189,18 +189,20 @@ static real applied_by_present(const esokit_state *o)
   return is_finite(u) ? u : ((u < 0.0) ? -LARGEST : LARGEST);
 }
 
-void esokit_set_trust(esokit_state *o, real trust)
+unsigned esokit_set_trust(esokit_state *o, real trust)
 {
-  if (is_finite(trust)) {
-    o->trust = (trust < 0.0) ? 0.0 : ((trust < 1.0) ? trust : 1.0);
-    set_weights(o);
+  if (!is_finite(trust)) {
+    return ESOKIT_INPUT_REJECTED;
   }
+  o->trust = (trust < 0.0) ? 0.0 : ((trust < 1.0) ? trust : 1.0);
+  set_weights(o);
+  return 0u;
 }
 
-void esokit_set_pin(esokit_state *o, uint8_t where)
+unsigned esokit_set_pin(esokit_state *o, uint8_t where)
 {
   if (where > ESOKIT_PIN_EITHER) {
-    return;
+    return ESOKIT_INPUT_REJECTED;
   }
   if (where == ESOKIT_PIN_EITHER) {
     const real u = applied_by_present(o);
@@ -219,6 +221,7 @@ void esokit_set_pin(esokit_state *o, uint8_t where)
   }
   o->pin = where;
   set_weights(o);
+  return 0u;
 }
 
 /* Tells that the plant is held; the u under which it would stand still. */

@@ -22,7 +22,7 @@ typedef struct {
   real applied;     /* o.u_applied */
   real disturbance; /* its estimate number DESIGN_ROW */
   uint32_t missed;   /* o.gap */
-  uint8_t status;    /* o.status */
+  uint16_t status;   /* o.status */
   bool runs;         /* o.mode is 0 */
 } esokit_sample;
 

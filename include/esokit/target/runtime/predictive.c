@@ -2,12 +2,35 @@
 R"esokit("
 #endif
 #if ESOKIT_PREDICTIVE
+/* Of the reference is it known by what would be computed with it. */
+static void report_reference(esokit_state *o, real used)
+{
+  if (!is_finite(used)) {
+    o->status = (uint16_t)(o->status | ESOKIT_REFERENCE_REJECTED);
+  }
+}
+
+static void arm_specially(esokit_state *o)
+{
+  real feed = 0.0;
+  if (o->mode == ESOKIT_START_HOLD) {
+    (void)arm_at(o, 0.0, &feed);
+  } else {
+#if ESOKIT_HOLDS_SAFE
+    (void)arm_at(o, o->u_last, &feed);
+#else
+    (void)arm_at(o, SAFE_INPUT, &feed);
+#endif
+  }
+  report_reference(o, feed);
+}
+
 /* What of the next u does not need its measurement. */
 static void arm(esokit_state *o)
 {
   bool good;
-  if (o->hold_left > 0u) {
-    (void)arm_hold(o);
+  if (o->mode != ESOKIT_RUNNING) {
+    arm_specially(o);
     return;
   }
 #if ESOKIT_SCHEDULE
@@ -22,7 +45,29 @@ static void arm(esokit_state *o)
     good = arm_after(o, o->gap);
   }
   if (!good) {
-    (void)arm_blind(o);
+    real u = 0.0;
+    (void)arm_blind(o, &u);
+    report_reference(o, u);
+  }
+}
+
+/* Which u is next: after the prediction, when a measurement that is missing counts as two. */
+static void judge_next(esokit_state *o)
+{
+  if (o->mode == ESOKIT_START_HOLD) {
+    o->hold_left = o->hold_left - 1u;
+    if (o->hold_left == 0u) {
+      o->mode = ESOKIT_RUNNING;
+    }
+  }
+  if (o->gap > MISSING_LIMIT) {
+    o->mode = ESOKIT_SAFE;
+#if !ESOKIT_STAYS_SAFE
+  } else if ((o->mode == ESOKIT_SAFE) && (o->gap <= 1u)) {
+    o->mode = ESOKIT_RUNNING;
+#endif
+  } else {
+    /* The mode stays. */
   }
 }
 
@@ -30,9 +75,11 @@ void esokit_init(esokit_state *o)
 {
   DESIGN_INIT
   o->measurement = 0.0;
+  o->u_held = 0.0;
   o->hold_left = HOLD_SAMPLES;
   o->gap = 0u;
-  o->phase = 0u;
+  o->mode = FIRST_MODE;
+  o->phase = FIRST_PHASE;
   o->status = 0u;
 }
 
@@ -46,9 +93,10 @@ unsigned esokit_start(esokit_state *o, real y, real u)
   }
   o->gap = 0u;
   o->hold_left = 0u;
+  o->mode = ESOKIT_RUNNING;
   (void)take_output(o, u);
   (void)track(o);
-  o->phase = 0u;
+  o->phase = 5u;
   (void)refer(o, y);
   arm(o);
   return 0u;
@@ -59,6 +107,11 @@ unsigned esokit_reset(esokit_state *o, real y)
   unsigned status = ESOKIT_STATE_REJECTED;
   if (restart_plain(o, y)) {
     o->hold_left = HOLD_SAMPLES;
+#if ESOKIT_HOLDS_AT_START
+    o->mode = ESOKIT_START_HOLD;
+#else
+    o->mode = ESOKIT_RUNNING;
+#endif
     o->phase = 0u;
     arm(o);
     status = 0u;
@@ -94,23 +147,31 @@ real esokit_control_without_measurement(esokit_state *o)
 static unsigned prepare_next(esokit_state *o, real next_r)
 {
   unsigned status = 0u;
+  real given = o->u_last;
   if (o->phase == 1u) {
     status = correct_outside(o, o->measurement);
+  } else {
+    if (o->phase == 3u) {
+      status = correct_outside(o, o->measurement);
+    }
+    if ((o->phase == 3u) || (o->phase == 4u)) {
+      given = o->u_held;
+    }
   }
 #if ESOKIT_WAITS
   (void)settle(o);
 #else
   (void)track(o);
 #endif
-  status = status | predict_outside(o, o->u_last);
-  o->phase = 0u;
-  if (o->hold_left > 0u) {
-    o->hold_left = o->hold_left - 1u;
+  status = status | predict_outside(o, given);
+  if ((o->phase != 1u) || (status != 0u) || (o->mode != ESOKIT_RUNNING)) {
+    judge_next(o);
   }
+  o->phase = 0u;
+  o->status = (uint16_t)status;
   (void)refer(o, next_r);
   arm(o);
-  o->status = (uint8_t)status;
-  return status;
+  return o->status;
 }
 
 real esokit_control(esokit_state *o, real y)
@@ -133,18 +194,21 @@ real esokit_update(esokit_state *o, real y, real next_r)
 unsigned esokit_applied(esokit_state *o, real u)
 {
   unsigned status = 0u;
-  real held = u;
   if (!is_finite(u)) {
-    status = ESOKIT_INPUT_REJECTED;
-    held = o->u_last;
+    return ESOKIT_INPUT_REJECTED;
   }
-  (void)take_output(o, held);
-  if (o->phase == 0u) {
+  if (o->phase == 5u) {
+    (void)take_output(o, u);
     (void)track(o);
-    if (!revise(o, held)) {
+  }
+  if ((o->phase == 0u) || (o->phase == 5u)) {
+    if (!revise(o, u)) {
       status = ESOKIT_INPUT_REJECTED;
     }
     arm(o);
+  } else {
+    o->u_held = u;
+    o->phase = ((o->phase == 1u) || (o->phase == 3u)) ? 3u : 4u;
   }
   return status;
 }
