@@ -86,6 +86,19 @@ TEST(CCode, OfOtherObservers) {
 }
 #endif
 
+/// A lost sensor ends in zero, or by name in the last u, with a limit of rate and without.
+TEST(CCode, OfWhatIsSafe) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  for (const bool hold : {false, true}) {
+    for (const bool free : {false, true}) {
+      equals_changed<Adrc<LinearEso<2, float>>>(20000, 141, "gcc -std=c99", [=](auto& settings) {
+        settings.missing = {.most = 5, .hold = hold};
+        if (free) settings.limits.rate = Limits<float>{}.rate;
+      });
+    }
+  }
+}
+
 TEST(CCode, ByClang) {
   if (!there("clang")) GTEST_SKIP() << "no clang";
   equals<LinearEso<2, float>>(20000, 131, "clang -std=c99 -ffp-contract=off");
