@@ -637,7 +637,7 @@ TEST(Adrc, BadConfigIsRefusedByName) {
 
 TEST(Adrc, CostsNothingThatIsNotAskedFor) {
   // The observer, the limiter, the two laws and the loop's bookkeeping.
-  EXPECT_LE(sizeof(Adrc<LinearEso<2, float>>), sizeof(LinearEso<2, float>) + 104);
+  EXPECT_LE(sizeof(Adrc<LinearEso<2, float>>), sizeof(LinearEso<2, float>) + 112);
   EXPECT_LT(sizeof(Adrc<LinearEso<2, float>>),
             sizeof(Adrc<esokit::DelayedInput<LinearEso<2, float>, 4>>));
 }
@@ -651,8 +651,10 @@ TEST(Adrc, HoldAndSafeInputAtTheLimit) {
     changed.missing.input = safe;
     return refusal(Linear::make(changed));
   };
-  const double above = std::nextafter(2.0, 3.0);
-  const double below = std::nextafter(-1.0, -2.0);
+  // Of what is at the limit in decimals the limiter takes the rest away.
+  const double above = 2.0 + 2e-15;
+  const double below = -1.0 - 1e-15;
+  EXPECT_EQ(with(std::nextafter(2.0, 3.0), std::nextafter(-1.0, -2.0)), "accepted");
   EXPECT_EQ(with(2, 2), "accepted");
   EXPECT_EQ(with(-1, -1), "accepted");
   EXPECT_EQ(with(above, 0), "start_hold.input: must not be above limits.upper");
