@@ -158,7 +158,6 @@ class CDesign {
     text_.feature("ESOKIT_DIVIDED", d.loop.divider > 1);
     text_.feature("ESOKIT_STAYS_SAFE", d.loop.stays_safe);
     text_.feature("ESOKIT_HOLDS_SAFE", d.loop.holds_safe);
-    text_.feature("ESOKIT_WAITS", d.waits);
     text_.feature("ESOKIT_MONITORED", d.options.watched);
     text_.feature("ESOKIT_SETTINGS", d.options.settings_in_struct);
     text_.feature("ESOKIT_TABLE", gains_stand);
