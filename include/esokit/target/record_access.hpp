@@ -214,15 +214,16 @@ struct RecordAccess {
         const EqualSampledPoles<size, Number> poles{in[0]};
         return arm<Numbers>(c, Gains{long_step_gain<size, Number>(poles, in[1])});
       });
-      add("arm_blanked", "", false, [](auto& c, const auto&) {
+      add("arm_blanked", "", true, [](auto& c, const auto&) {
         using C = std::remove_cvref_t<decltype(c)>;
         c.observer_.numbers_.laws[0].age_ = std::uint32_t{0};  // it publishes what it keeps
         typename C::Reference::All reference;
         int row = 0;
         for (const Number& one : c.reference_) reference(row++) = one;
         c.settle_for(c.set_.law.control(c.observer_.estimate(), reference));
+        const Number blind = c.next_.blind;
         c.settle_for_blind();
-        return Numbers{};
+        return Numbers{blind};
       });
     }
   }

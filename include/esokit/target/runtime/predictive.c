@@ -35,7 +35,9 @@ static void arm(esokit_state *o)
   }
 #if ESOKIT_SCHEDULE
   if (o->age <= LEAST_AGE) { /* too early for estimates */
-    (void)arm_blanked(o);
+    real u = 0.0;
+    (void)arm_blanked(o, &u);
+    report_reference(o, u);
     return;
   }
 #endif
