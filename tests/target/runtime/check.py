@@ -22,11 +22,11 @@ KINDS = [{"CONTROLLER"}, {"CONTROLLER", "ERROR_BASED"}, {"CONTROLLER", "COMPENSA
          {"PREDICTIVE", "WAITS"}, set()]
 LAWS = [{"TABLE", "GAIN_IS_KEPT"}, {"TABLE"}, {"SCHEDULE"}, {"FILTER"}, {"FILTER", "RETURNS"},
         {"FILTER", "WATCHED"}, {"FILTER", "RETURNS", "WATCHED"}]
-OF_LOOPS = ["DIVIDED", "STAYS_SAFE", "SAFE_INPUT", "SOFTENS", "MONITORED"]
+OF_LOOPS = ["DIVIDED", "STAYS_SAFE", "HOLDS_SAFE", "SOFTENS", "MONITORED"]
 GUARDS = [set(), {"GUARDED"}, {"GUARDED", "BOUNDED"}, {"GUARDED", "LEAKS"}, {"GUARDED", "BOUND_OF_U"},
           {"GUARDED", "BOUNDED", "BOUND_OF_U", "LEAKS"}]
 W = [set(), {"MEASURED", "ONE_W"}, {"MEASURED"}]
-FLAGS = OF_LOOPS + ["SETTINGS", "DELAYED", "GATED", "WRAPPED", "KNOWN", "SINGLE"]
+FLAGS = OF_LOOPS + ["HOLDS_AT_START", "SETTINGS", "DELAYED", "GATED", "WRAPPED", "KNOWN", "SINGLE"]
 DEVIATIONS = ("2.5", "15.5", "21.15")
 ALL = sorted({*FLAGS, "GATED_ANGLE", "LAW_OF_ANGLE"}.union(*KINDS, *LAWS, *GUARDS, *W))
 
@@ -36,7 +36,9 @@ def valid(has):
     loop = "CONTROLLER" in has
     kept = "GAIN_IS_KEPT" in has
     return not (
-        (not loop and has & set(OF_LOOPS) - {"MONITORED"})
+        (not loop and has & set(OF_LOOPS) - {"MONITORED"} -
+         ({"STAYS_SAFE", "HOLDS_SAFE"} if "PREDICTIVE" in has else set()))
+        or ("HOLDS_AT_START" in has and "PREDICTIVE" not in has)
         or ("PREDICTIVE" in has and (has & {"DELAYED", "GATED", "WRAPPED", "KNOWN", "MEASURED", "GUARDED",
                                             "SETTINGS"} or ("TABLE" in has and not kept)))
         or ("GUARDED" in has and (not kept or "MEASURED" in has))

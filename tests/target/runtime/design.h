@@ -89,6 +89,9 @@ typedef double real;
 #define MISSING_LIMIT 10u
 #define HOLD_SAMPLES 13u
 #define FIRST_MODE 1u
+#define FIRST_PHASE 0u
+#define FIRST_SPECIAL 1u
+#define FIRST_KEPT number(0.25)
 #define HOLD_INPUT number(0.5)
 #define SAFE_INPUT number(0.5)
 #define GATE_FACTOR number(6.0)
@@ -132,7 +135,8 @@ typedef double real;
   bool is_inlier(const esokit_state *o, real y); \
   bool drive(const esokit_state *o, real u, real *u_out); \
   bool limit(esokit_state *o, real u, real *u_out); \
-  bool take_applied(esokit_state *o, real u); \
+  bool take_over(esokit_state *o, real u); \
+  bool within(const esokit_state *o, real u, real *u_out); \
   bool harden(esokit_state *o); \
   bool law_for(const esokit_state *o, real r, real e0, real e1, real e2, real *u_out); \
   DESIGN_LAW bool scaled_bound(const esokit_state *o, real bound, real *u_out); \
@@ -161,8 +165,8 @@ typedef double real;
   bool settle(esokit_state *o); \
   bool revise(esokit_state *o, real u); \
   bool arm_restart(esokit_state *o); \
-  bool arm_hold(esokit_state *o); \
-  bool arm_blind(esokit_state *o); \
+  bool arm_at(esokit_state *o, real u, real *u_out); \
+  bool arm_blind(esokit_state *o, real *u_out); \
   DESIGN_REST DESIGN_PHASES
 #if ESOKIT_WRAPPED
 #define DESIGN_REST bool rest_at(esokit_state *o, real y, real u, real angle);
@@ -172,7 +176,7 @@ typedef double real;
 #if ESOKIT_SCHEDULE
 #define DESIGN_LAW
 #define DESIGN_PHASES \
-  bool arm_blanked(esokit_state *o); \
+  bool arm_blanked(esokit_state *o, real *u_out); \
   bool arm_by(esokit_state *o); \
   bool arm_long(esokit_state *o, real contraction, real samples);
 #elif ESOKIT_FILTER
