@@ -44,7 +44,8 @@ constexpr const char* calls[] = {"restart_at y",
                                  "is_inlier y -",
                                  "drive u = -",
                                  "limit u =",
-                                 "take_applied u",
+                                 "take_over u",
+                                 "within u = -",
                                  "harden",
                                  "law_for r e0 e1 e2 = -",
 
@@ -74,9 +75,9 @@ constexpr const char* calls[] = {"restart_at y",
                                  "settle",
                                  "revise u",
                                  "arm_restart",
-                                 "arm_hold",
-                                 "arm_blind",
-                                 "arm_blanked",
+                                 "arm_at u =",
+                                 "arm_blind =",
+                                 "arm_blanked =",
                                  "arm_long contraction samples"};
 
 void add_call(detail::RecordedDesign& design, const std::string& call) {
@@ -152,10 +153,11 @@ detail::RecordedDesign design_of(Random& random) {
       if (is()) d.measured.paths.push_back({.memory = {0, 0}});
     }
   }
+  d.loop.holds_safe = is();
+  d.loop.stays_safe = is();
+  d.hold = is() ? 13 : 0;
   if (d.is_controller) {
     d.loop.divider = is() ? 3 : 1;
-    d.loop.has_safe_input = is();
-    d.loop.stays_safe = is();
     d.softens = !d.compensates && is();
   }
   d.options.settings_in_struct = !d.predictive && stands && d.gain_is_kept && !d.softens && is();

@@ -184,8 +184,7 @@ void controls_changed(std::uint64_t seed, const Change& change) {
       // Before all else, as the block does; w after a start.
       if constexpr (guarded) told.tell(controller, observer, samples, random);
       if (starts) start_status = static_cast<unsigned>(controller.start(y, held));
-      const auto report_status =
-          reports ? static_cast<unsigned>(controller.applied(held)) : 0u;
+      const auto report_status = reports ? static_cast<unsigned>(controller.applied(held)) : 0u;
       if constexpr (!guarded) told.tell(controller, observer, samples, random);
       bool done = false;
       V u{};
@@ -360,8 +359,9 @@ void predicts_in_text(std::uint64_t seed) {
     }
     C controller = C::make(settings).value();
     const auto block = to_structured_text(controller, {.name = "loop"}).value();
-    Samples samples("y no_y next_r u_held starts reports : u status mode start_status report_status" +
-                    estimate_names(Observer::size));
+    Samples samples(
+        "y no_y next_r u_held starts reports : u status mode start_status report_status" +
+        estimate_names(Observer::size));
     ChainPlant plant(C::order, 0.0078125, gain, 1.5);
     Random random(seed++ + asked("ESOKIT_WRITTEN_SEED", 0));
     V r(1);
@@ -377,8 +377,7 @@ void predicts_in_text(std::uint64_t seed) {
       const bool starts = random.index(80) == 0;
       const bool reports = random.index(30) == 0;
       if (starts) start_status = static_cast<unsigned>(controller.start(y, held));
-      const auto report_status =
-          reports ? static_cast<unsigned>(controller.applied(held)) : 0u;
+      const auto report_status = reports ? static_cast<unsigned>(controller.applied(held)) : 0u;
       const V u = lost > 0 ? controller.control_without_measurement() : controller.control(y);
       const auto status = static_cast<unsigned>(controller.prepare(given));
       samples.number(y).count(lost > 0).number(given).number(held).count(starts).count(reports);

@@ -210,7 +210,8 @@ inline void compiles_elsewhere(const CCode& code, const std::string& name) {
   }
 }
 
-/// Would a test notice? ESOKIT_MUTANT='o->gap > 1u@@o->gap > 2u' changes the text once, if it has it.
+/// Would a test notice? ESOKIT_MUTANT='o->gap > 1u@@o->gap > 2u' changes the text once, if it has
+/// it.
 inline std::string mutant(std::string text) {
   const char* given = std::getenv("ESOKIT_MUTANT");
   if (given == nullptr) return text;

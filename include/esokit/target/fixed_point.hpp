@@ -443,10 +443,10 @@ class FixedText {
     }
     const std::string flagged =
         ";\n    o->status = (uint8_t)(o->status | $NAME_REFERENCE_REJECTED);\n  }\n";
-    const std::string clamp_r =
-        wraps ? ""
-              : "  if (r > " + y_most + ") {\n    r = " + y_most + flagged + "  if (r < -" + y_most +
-                    ") {\n    r = -" + y_most + flagged;
+    const std::string clamp_r = wraps ? ""
+                                      : "  if (r > " + y_most + ") {\n    r = " + y_most + flagged +
+                                            "  if (r < -" + y_most + ") {\n    r = -" + y_most +
+                                            flagged;
     std::string gain;
     for (const std::int32_t one_gain : gains_) {
       gain += (gain.empty() ? "" : ", ") + std::to_string(one_gain);
