@@ -4,6 +4,7 @@
 # of another study, one that is missing. The last line is "N passed, N failed".
 set -uo pipefail
 study=$(realpath "${1:?usage: check.sh STUDY [STUDY_MPI]}")
+self=$(realpath "$0")
 mpi=${2:+$(realpath "$2")}
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
@@ -73,7 +74,7 @@ part 1/3 cut
 check "is computed again" merged loop0 cut loop2
 
 check "no such part" says "part.index" "$study" --part 3/3 --records none
-check "nor such a file" says "records = 0: must begin" "$study" merge "$0"
+check "nor such a file" says "records = 0: must begin" "$study" merge "$self"
 check "nor a file that is not there" says "records = 0: cannot be read" "$study" merge nowhere
 "$study" replay --runs "$runs" 4711 >run.csv
 check "a run alone" test "$(wc -l <run.csv)" = 1001
