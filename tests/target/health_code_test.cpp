@@ -31,8 +31,8 @@ unsigned loop_size(void);
 unsigned loop_size(void) { return sizeof(loop_state) + sizeof(health_state); }
 void both_init(loop_state *o, health_state *h);
 void both_init(loop_state *o, health_state *h) { loop_init(o); health_clear(h); }
-void both_look(const loop_state *o, health_state *h);
-void both_look(const loop_state *o, health_state *h)
+void both_look(const loop_state *o, health_state *h, double y);
+void both_look(const loop_state *o, health_state *h, double y)
 {
   health_sample s;
   s.innovation = o->innovation;
@@ -40,6 +40,7 @@ void both_look(const loop_state *o, health_state *h)
   s.held = o->u_last;
   s.applied = o->u_applied;
   s.disturbance = loop_estimate(o, ORDER);
+  s.measured = (REAL)y;
   s.missed = o->gap;
   s.status = o->status;
   s.runs = o->mode == 0u;
@@ -51,15 +52,18 @@ void both_look(const loop_state *o, health_state *h)
 template <class V>
 struct Found {
   std::uint32_t samples, rejected, bridged, unsafe;
-  V saturated, side, innovation, gain_ratio, response, evidence, opposed;
+  V lost, saturated, side, innovation, gain_ratio, sign_ratio, response, evidence, opposed;
+  V standing;
+  bool reversed;
 };
 
 /// @param plant_gain over b0 @return how often which fault was named
 template <class C>
-std::array<int, 8> watches(double plant_gain, double bad, std::uint64_t seed) {
+/// @param stands share of the time for which the sensor stands still
+std::array<int, 9> watches(double plant_gain, double bad, std::uint64_t seed, double stands = 0) {
   SCOPED_TRACE(testing::internal::GetTypeName<C>());
   using V = typename C::scalar_type;
-  std::array<int, 8> named{};
+  std::array<int, 9> named{};
   auto settings = config<C>(8);
   settings.limits.rate = std::numeric_limits<V>::max();
   C mine = C::make(settings).value();
@@ -69,9 +73,10 @@ std::array<int, 8> watches(double plant_gain, double bad, std::uint64_t seed) {
   const Folder folder;
   folder.write("health.h", health.header);
   folder.write("health.c", health.source);
-  const Library library(
-      folder, code,
-      "#define ORDER " + std::to_string(C::order) + "u\n#include \"health.c\"\n" + both);
+  const Library library(folder, code,
+                        std::string("#define REAL ") +
+                            (sizeof(V) == sizeof(float) ? "float" : "double") + "\n#define ORDER " +
+                            std::to_string(C::order) + "u\n#include \"health.c\"\n" + both);
   if (!library.loaded()) {
     ADD_FAILURE() << "does not compile";
     return named;
@@ -80,7 +85,7 @@ std::array<int, 8> watches(double plant_gain, double bad, std::uint64_t seed) {
   std::vector<std::uint64_t> its(1000);
   void (*init)(void*, void*) = nullptr;
   V (*update)(void*, V, V) = nullptr;
-  void (*look)(const void*, void*) = nullptr;
+  void (*look)(const void*, void*, double) = nullptr;
   unsigned (*diagnoses)(const void*) = nullptr;
   library.find(init, "both_init");
   library.find(update, "loop_update");
@@ -96,12 +101,18 @@ std::array<int, 8> watches(double plant_gain, double bad, std::uint64_t seed) {
     if (k % 3000 == 0) plant.set_state(std::vector<double>(C::order, 0.0));
     if (random.index(60) == 0) r = static_cast<V>(random.uniform(-1, 1));
     V y = static_cast<V>(plant.output() + 1e-3 * random.uniform(-1, 1));
+    if (k % 8000 < 8000 * stands) y = V(0.25);
     if (random.uniform(0, 1) < bad)
       y = random.index(2) == 0 ? hidden_nan<V>() : anything<V>(random);
     (void)mine.update(y, r);
     (void)update(loop.data(), y, r);
-    watch.look(mine);
-    look(loop.data(), its.data());
+    // Every other run without a watched sensor.
+    if (seed % 2 == 1) {
+      watch.look(mine);
+    } else {
+      watch.look(mine, y);
+    }
+    look(loop.data(), its.data(), seed % 2 == 1 ? hidden_nan<double>() : static_cast<double>(y));
     const auto& of_cpp = watch.health();
     Found<V> of_c;
     std::memcpy(&of_c, its.data(), sizeof of_c);
@@ -109,6 +120,10 @@ std::array<int, 8> watches(double plant_gain, double bad, std::uint64_t seed) {
     EXPECT_EQ(of_cpp.rejected, of_c.rejected) << k;
     EXPECT_EQ(of_cpp.bridged, of_c.bridged) << k;
     EXPECT_EQ(of_cpp.unsafe, of_c.unsafe) << k;
+    EXPECT_TRUE(equal_bits(of_cpp.lost, of_c.lost)) << k;
+    EXPECT_TRUE(equal_bits(of_cpp.sign_ratio, of_c.sign_ratio)) << k;
+    EXPECT_TRUE(equal_bits(of_cpp.standing, of_c.standing)) << k;
+    EXPECT_EQ(of_cpp.reversed, of_c.reversed) << k;
     EXPECT_TRUE(equal_bits(of_cpp.saturated, of_c.saturated)) << k;
     EXPECT_TRUE(equal_bits(of_cpp.side, of_c.side)) << k;
     EXPECT_TRUE(equal_bits(of_cpp.innovation, of_c.innovation)) << k;
@@ -128,7 +143,7 @@ TEST(HealthCode, EqualsTheMonitor) {
   using C = Adrc<LinearEso<2, double>>;
   using Small = Adrc<LinearEso<1, float>>;
   using Cascade = Adrc<CascadeEso<1, 2, float>>;
-  const auto often = [](const std::array<int, 8>& named, LoopFault fault) {
+  const auto often = [](const std::array<int, 9>& named, LoopFault fault) {
     EXPECT_GT(named[static_cast<std::size_t>(fault)], 300)
         << static_cast<int>(fault) << " of " << testing::PrintToString(named);
   };
@@ -136,6 +151,8 @@ TEST(HealthCode, EqualsTheMonitor) {
   often(watches<C>(-1, 0, 2), LoopFault::wrong_sign);
   often(watches<Small>(6, 0, 3), LoopFault::innovation_too_large);
   often(watches<Cascade>(1, 0.3, 4), LoopFault::measurements_rejected);
+  often(watches<C>(1, 0, 6, 0.8), LoopFault::sensor_still);
+  often(watches<Small>(-1, 0.01, 8, 0.3), LoopFault::wrong_sign);
 }
 
 TEST(HealthCode, CompilesWithOtherCompilers) {

@@ -453,7 +453,8 @@ void monitors_in_text(double plant_gain, double bad, LoopFault fault, std::uint6
   const auto health = to_structured_text(watch, controller).value();
   Samples of_loop("y no_y r : u innovation asked applied missed");
   Samples of_health(
-      "innovation asked held applied disturbance missed its_status mode : fault gain_ratio "
+      "innovation asked held applied measured disturbance missed its_status mode : fault "
+      "gain_ratio "
       "response "
       "saturated");
   ChainPlant plant(C::order, 0.0078125, 8 * plant_gain, 1.5);
@@ -467,8 +468,9 @@ void monitors_in_text(double plant_gain, double bad, LoopFault fault, std::uint6
     if (random.index(60) == 0) r = static_cast<V>(random.uniform(-1, 1));
     V y = static_cast<V>(plant.output() + 1e-3 * random.uniform(-1, 1));
     if (random.uniform(0, 1) < bad) y = odd(random, hidden_nan<V>());
+    if (fault == LoopFault::sensor_still) y = V(0.25);
     (void)controller.update(y, r);
-    watch.look(controller);
+    watch.look(controller, y);
     const auto& observer = controller.observer();
     const V values[] = {observer.innovation(), controller.requested(), controller.output(),
                         observer.applied_input()};
@@ -476,7 +478,7 @@ void monitors_in_text(double plant_gain, double bad, LoopFault fault, std::uint6
     of_loop.number(y).count(0).number(r).number(values[2]).number(values[0]).number(values[1]);
     of_loop.number(values[3]).count(missed).word("\n");
     for (const V value : values) of_health.number(value);
-    of_health.number(observer.template estimate<C::order>()).count(missed);
+    of_health.number(y).number(observer.template estimate<C::order>()).count(missed);
     of_health.count(static_cast<unsigned>(controller.status()));
     of_health.count(static_cast<unsigned>(controller.mode()));
     const auto& seen = watch.health();
@@ -494,6 +496,7 @@ TEST(StructuredText, OfMonitors) {
   monitors_in_text<Adrc<LinearEso<2, double>>>(1, 0.02, LoopFault::none, 801);
   monitors_in_text<Adrc<LinearEso<2, double>>>(-1, 0, LoopFault::wrong_sign, 811);
   monitors_in_text<Adrc<LinearEso<1, float>>>(6, 0, LoopFault::innovation_too_large, 821);
+  monitors_in_text<Adrc<LinearEso<1, double>>>(1, 0, LoopFault::sensor_still, 841);
   monitors_in_text<Adrc<CascadeEso<1, 2, float>>>(1, 0.3, LoopFault::measurements_rejected, 831);
 }
 

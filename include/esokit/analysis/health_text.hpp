@@ -47,9 +47,17 @@ struct Advice {
               "The model may lack a lag or a delay, b0 may change, or the noise may be larger than "
               "given: identify from a log."};
     case LoopFault::gain_too_large_or_disturbed:
-      return {"The effect of u is cancelled at once: a load drives u, or b0 is too large.",
-              "Let GainProbe add small steps to u: if its gain ratio is small, too, multiply "
-              "input_gain by it."};
+      return {
+          "The effect of u is cancelled at once: a load drives u, b0 is too large, or the actuator "
+          "is off.",
+          "Let GainProbe add small steps to u: if its gain ratio is small, too, multiply "
+          "input_gain by it."};
+    case LoopFault::sensor_still:
+      return {
+          "The measurement does not change although u moves or is at a limit: the sensor stands "
+          "still, or the machine is held.",
+          "Set the output to its safe value; look at the sensor, its cable and its bus, then for "
+          "a stop, a brake or friction."};
   }
   return {"", ""};
 }

@@ -68,6 +68,7 @@ requires std::same_as<S, typename Controller::scalar_type> Expected<CCode, Error
   const auto settings = detail::RecordAccess::health(monitor, controller);
   number("SAMPLE_TIME", controller.observer().sample_time());
   number("WEIGHT", settings.weight);
+  number("RARE_WEIGHT", settings.rare_weight);
   number("HAIR", settings.hair);
   number("LARGEST_SQUARE", settings.largest_square);
   number("LARGEST", S(1000) * settings.range);
@@ -76,6 +77,10 @@ requires std::same_as<S, typename Controller::scalar_type> Expected<CCode, Error
   number("MIDDLE", settings.middle);
   number("END_OF_RANGE", static_cast<S>(0.9) * settings.range);
   number("LEAST_AGAINST", settings.least_against);
+  number("RANGE", settings.range);
+  number("LARGE_MOVE", static_cast<S>(0.3) * settings.range);
+  number("SAID", static_cast<S>(-0.3));
+  number("TENTH", S(1) / S(10));
   number("LEAST_SHARE", static_cast<S>(0.02) * settings.range);
   number("LEAST_PHI", settings.least);
   number("STEP", settings.step);
@@ -87,6 +92,9 @@ requires std::same_as<S, typename Controller::scalar_type> Expected<CCode, Error
   limit("FOR_EVIDENCE", limits.evidence);
   limit("FOR_EVIDENCE_OF_SIGN", limits.evidence_of_sign);
   limit("FOR_OPPOSED", limits.opposed);
+  limit("FOR_SIGN_RATIO", limits.sign_ratio);
+  limit("RIGHT_SIGN", -limits.sign_ratio);
+  limit("FOR_STANDING", 0.99);
   limit("FOR_WRONG_SIGN", limits.wrong_sign);
   limit("FOR_TOO_SMALL", limits.too_small);
   limit("FOR_RESPONSE", limits.response);
@@ -130,6 +138,7 @@ to_structured_text(const HealthMonitor<Size, S>& monitor, const Controller& cont
   of_sample("asked", "such an output");
   of_sample("held", "its u");
   of_sample("applied", "such an output");
+  of_sample("measured", "y, as given to the controller's block");
   of_sample("disturbance", ("its e" + std::to_string(Controller::order)).c_str());
   block.input("missed : UINT", "such an output");
   block.input("its_status : UINT", "its status");
@@ -144,7 +153,7 @@ to_structured_text(const HealthMonitor<Size, S>& monitor, const Controller& cont
       "0: none, 1: the sign of b0 is wrong, 2: b0 is several times too small, 3: more than "
       "a tenth of y are rejected, 4: u is at a limit more than half of the time, 6: the "
       "innovation is three times that of the noise, 7: b0 is too large, or a load drives "
-      "u");
+      "u, 8: the sensor stands still");
   for (const char* name : {"gain_ratio", "response", "saturated"}) {
     block.output(std::string(name) + " : $real", "see HealthMonitor");
     block.body += std::string(name) + " := o." + name + ";\n";

@@ -603,13 +603,15 @@ struct RecordAccess {
   static auto health(const M& m, const C& c) noexcept {
     using S = typename M::scalar_type;
     struct Numbers {
-      S weight, hair, largest_square, range, pole, slow, middle, least_against, least, step, forget;
+      S weight, rare_weight, hair, largest_square, range, pole, slow, middle, least_against, least,
+          step, forget;
       S input_gain, of_noise;
       int divider;
     } numbers;
     const S b = c.observer().input_gain();
     numbers.range = absolute(b) * m.range_;
     numbers.weight = m.weight_;
+    numbers.rare_weight = m.rare_weight();
     numbers.hair = static_cast<S>(1e-4) * m.range_;
     numbers.largest_square = m.largest_square();
     numbers.pole = m.pole_;

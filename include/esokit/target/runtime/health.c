@@ -9,40 +9,60 @@ void esokit_clear(esokit_state *o)
   o->is_free = true;
 }
 
-static real nearer(real share, real now)
+static real nearer(real share, real now, real weight)
 {
-  return share + (WEIGHT * (now - share));
+  return share + (weight * (now - share));
+}
+
+static uint32_t counted(uint32_t many, bool now)
+{
+  uint32_t next = many;
+  if (now && (many < 4294967295u)) {
+    next = many + 1u;
+  }
+  return next;
 }
 
 static void count(esokit_state *o, const esokit_sample *sample, bool rejected)
 {
   const real beyond = sample->asked - sample->held;
   real limit = 0.0;
+  real gone = 0.0;
   if (sample->runs && (beyond > HAIR)) {
     limit = 1.0;
   }
   if (sample->runs && (beyond < -HAIR)) {
     limit = -1.0;
   }
-  o->samples = o->samples + 1u;
   if (rejected) {
-    o->rejected = o->rejected + 1u;
+    gone = 1.0;
   }
-  if ((sample->status & (8u | 16u)) != 0u) {
-    o->bridged = o->bridged + 1u;
+  o->samples = counted(o->samples, true);
+  o->rejected = counted(o->rejected, rejected);
+  o->bridged = counted(o->bridged, (sample->status & (8u | 16u)) != 0u);
+  o->unsafe = counted(o->unsafe, !sample->runs);
+  o->lost = nearer(o->lost, gone, RARE_WEIGHT);
+  o->saturated = nearer(o->saturated, fabs(limit), WEIGHT);
+  o->side = nearer(o->side, limit, WEIGHT);
+}
+
+/* Whether y stands still. */
+static void watch_sensor(esokit_state *o, real measured)
+{
+  real same = 0.0;
+  if (o->has_last && (measured >= o->last) && (measured <= o->last)) {
+    same = 1.0;
   }
-  if (!sample->runs) {
-    o->unsafe = o->unsafe + 1u;
-  }
-  o->saturated = nearer(o->saturated, fabs(limit));
-  o->side = nearer(o->side, limit);
+  o->standing = nearer(o->standing, same, RARE_WEIGHT);
+  o->last = measured;
+  o->has_last = true;
 }
 
 static void average(esokit_state *o, real innovation)
 {
   const real square = innovation * innovation;
   if (is_finite(square) && (square < LARGEST_SQUARE)) {
-    o->mean_square = nearer(o->mean_square, square);
+    o->mean_square = nearer(o->mean_square, square, WEIGHT);
     o->innovation = sqrt(o->mean_square);
   }
 }
@@ -53,6 +73,14 @@ static bool filter(esokit_state *o, real phi, real psi)
   const real most = LARGEST;
   real filtered = phi;
   unsigned i;
+  if (o->samples == DIVIDER) {
+    /* The first: whatever u and load are, they are no move. At rest they cancel. */
+    for (i = 0u; i < SIZE; ++i) {
+      o->stages[i] = -psi;
+    }
+    o->slow_phi = -psi;
+    o->slow_psi = psi;
+  }
   for (i = 0u; i < SIZE; ++i) {
     o->stages[i] = filtered + (POLE * (o->stages[i] - filtered));
     filtered = o->stages[i];
@@ -71,9 +99,12 @@ static bool filter(esokit_state *o, real phi, real psi)
   }
   o->slow_phi = 0.0;
   o->slow_psi = 0.0;
+  o->sum_x = 0.0;
   o->sum_xx = 0.0;
   o->sum_xy = 0.0;
   o->sum_aa = 0.0;
+  o->large_xx = 0.0;
+  o->large_xy = 0.0;
   o->opposed = 0.0;
   return false;
 }
@@ -84,6 +115,7 @@ static void oppose(esokit_state *o, real psi)
   const real now = o->phi - MIDDLE;
   const real late = o->slow_phi - MIDDLE;
   real side = 0.0;
+  real least = LEAST_AGAINST;
   real against;
   if ((now > END_OF_RANGE) && (late > END_OF_RANGE)) {
     side = 1.0;
@@ -93,7 +125,14 @@ static void oppose(esokit_state *o, real psi)
     /* Not near. */
   }
   against = (-side) * (o->phi + psi);
-  if (against > LEAST_AGAINST) {
+  /* By a share of what sign_ratio says, unless that is clear: a load helps a machine back, too. */
+  if (o->sign_ratio > -0.5) {
+    const real said = (SAID * o->sign_ratio) * RANGE;
+    if (least < said) {
+      least = said;
+    }
+  }
+  if (against > least) {
     o->opposed = o->opposed + STEP;
   } else {
     o->opposed = 0.0;
@@ -102,9 +141,12 @@ static void oppose(esokit_state *o, real psi)
 
 static void forget(esokit_state *o)
 {
+  o->sum_x = FORGET * o->sum_x;
   o->sum_xx = FORGET * o->sum_xx;
   o->sum_xy = FORGET * o->sum_xy;
   o->sum_aa = FORGET * o->sum_aa;
+  o->large_xx = FORGET * o->large_xx;
+  o->large_xy = FORGET * o->large_xy;
   o->evidence = FORGET * o->evidence;
 }
 
@@ -116,20 +158,52 @@ static void regress(esokit_state *o)
     const real a = o->x + o->y;
     real quotient;
     real square;
+    o->sum_x = o->sum_x + size;
     o->sum_xx = o->sum_xx + (o->x * o->x);
     o->sum_xy = o->sum_xy + (o->x * o->y);
     o->sum_aa = o->sum_aa + (a * a);
-    o->evidence = o->evidence + STEP;
+    o->evidence = STEP * (o->sum_x * (o->sum_x / o->sum_xx));
     quotient = o->sum_xy / o->sum_xx;
     square = o->sum_aa / o->sum_xx;
     if (is_finite(quotient) && is_finite(square)) {
       o->gain_ratio = 1.0 + quotient;
       o->response = sqrt(square);
+      if (size > LARGE_MOVE) {
+        o->large_xx = o->large_xx + (o->x * o->x);
+        o->large_xy = o->large_xy + (o->x * o->y);
+        o->sign_ratio = 1.0 + (o->large_xy / o->large_xx);
+      }
     }
   }
 }
 
-void esokit_look(esokit_state *o, const esokit_sample *sample)
+/* Whether the sign of b0 is wrong by what is seen now. */
+static bool sees_wrong_sign(const esokit_state *o)
+{
+  const double rho = (double)o->gain_ratio;
+  const double evidence = (double)o->evidence;
+  const double large = (double)o->sign_ratio;
+  const bool reversed = large < FOR_SIGN_RATIO;
+  const bool unseen = (large >= NEGATIVE) && (large <= NEGATIVE);
+  const bool surely = (rho < FOR_WRONG_SIGN) && (evidence >= FOR_EVIDENCE_OF_SIGN);
+  const bool against = (evidence >= ONCE) && ((double)o->opposed >= FOR_OPPOSED);
+  return (reversed && (against || surely)) || (unseen && surely);
+}
+
+/* Until u has moved y the right way. */
+static void remember_sign(esokit_state *o)
+{
+  const bool right = ((double)o->sign_ratio > RIGHT_SIGN) && ((double)o->saturated < SWINGS);
+  if (sees_wrong_sign(o)) {
+    o->reversed = true;
+  } else if (right && ((double)o->evidence >= FOR_EVIDENCE)) {
+    o->reversed = false;
+  } else {
+    /* Nothing new. */
+  }
+}
+
+static void take_sample(esokit_state *o, const esokit_sample *sample)
 {
   const bool rejected = (sample->status & (1u | 64u)) != 0u;
   real phi;
@@ -139,7 +213,7 @@ void esokit_look(esokit_state *o, const esokit_sample *sample)
   if ((sample->missed == 0u) && !rejected) {
     average(o, sample->innovation);
   }
-  o->lost = o->lost || rejected;
+  o->is_lost = o->is_lost || rejected;
   o->is_free = o->is_free && sample->runs;
   o->phi_sum = o->phi_sum + (INPUT_GAIN * sample->applied);
   o->phase = (uint16_t)(o->phase + 1u);
@@ -149,9 +223,9 @@ void esokit_look(esokit_state *o, const esokit_sample *sample)
   o->phase = 0u;
   phi = o->phi_sum / (real)DIVIDER;
   o->phi_sum = 0.0;
-  lost = o->lost || (sample->missed >= DIVIDER);
+  lost = o->is_lost || (sample->missed >= DIVIDER);
   is_free = o->is_free;
-  o->lost = false;
+  o->is_lost = false;
   o->is_free = true;
   if (!filter(o, phi, sample->disturbance)) {
     return;
@@ -167,6 +241,16 @@ void esokit_look(esokit_state *o, const esokit_sample *sample)
   regress(o);
 }
 
+void esokit_look(esokit_state *o, const esokit_sample *sample)
+{
+  if ((sample->missed == 0u) && ((sample->status & (1u | 64u)) == 0u) &&
+      is_finite(sample->measured)) {
+    watch_sensor(o, sample->measured);
+  }
+  take_sample(o, sample);
+  remember_sign(o);
+}
+
 unsigned esokit_diagnose(const esokit_state *o)
 {
   const double rho = (double)o->gain_ratio;
@@ -178,14 +262,15 @@ unsigned esokit_diagnose(const esokit_state *o)
   const bool swings = (saturated > SWINGS) && (side < limit) && (side > -limit);
   const bool told = evidence >= FOR_EVIDENCE;
   unsigned fault = ESOKIT_NONE;
-  if (((rho < NEGATIVE) && (evidence >= ONCE) && ((double)o->opposed >= FOR_OPPOSED)) ||
-      ((rho < FOR_WRONG_SIGN) && (evidence >= FOR_EVIDENCE_OF_SIGN))) {
+  if (o->reversed || sees_wrong_sign(o)) {
     fault = ESOKIT_WRONG_SIGN;
   } else if (told && ((rho > FOR_TOO_SMALL) ||
                       (swings && (response > FOR_RESPONSE) && (rho > (response / A_QUARTER))))) {
     fault = ESOKIT_GAIN_TOO_SMALL;
-  } else if ((o->rejected > 10u) && (o->rejected > (o->samples / 10u))) {
+  } else if (o->lost > TENTH) {
     fault = ESOKIT_MEASUREMENTS_REJECTED;
+  } else if (((double)o->standing > FOR_STANDING) && ((o->saturated > 0.5) || told)) {
+    fault = ESOKIT_SENSOR_STILL;
   } else if (o->saturated > 0.5) {
     fault = ESOKIT_SATURATED;
   } else if ((NOISE > 0.0) && (o->innovation > THRICE_NOISE)) {
