@@ -20,7 +20,8 @@ inline constexpr const char* header =
 #include <esokit/target/runtime/controller.h>
     ;
 /// What is called stands before what calls it.
-inline constexpr const char* source[] = {
+inline const std::vector<const char*> source = {
+    head,
 #include <esokit/target/runtime/recorded.c>
     ,
 #include <esokit/target/runtime/law.c>
@@ -125,8 +126,7 @@ class CDesign {
   /// `name.c`.
   [[nodiscard]] std::string source() {
     text_.lines("DESIGN_LISTS", "");
-    std::string shell;
-    for (const auto& file : runtime::source) shell += text_.part(file);
+    const std::string shell = text_.parts(runtime::source);
     std::string lists;
     for (std::size_t i = 0; i < design_.names.size(); ++i) {
       const NamedCall& names = design_.names[i];
@@ -134,9 +134,7 @@ class CDesign {
       lists += c_function(writer_, design_.options.name, names, design_.calls[i]);
     }
     text_.lines("DESIGN_LISTS", lists);
-    std::string rest;
-    for (const auto& file : runtime::source) rest += text_.part(file);
-    return text_.source(rest);
+    return text_.source(runtime::source);
   }
 
   /// The settings for a file of their own.

@@ -10,7 +10,7 @@
 #include <esokit/core/expected.hpp>
 #include <esokit/target/c_code.hpp>
 #include <esokit/target/fixed_design.hpp>
-#include <esokit/target/fixed_text.hpp>
+#include <esokit/target/runtime_text.hpp>
 #include <string>
 #include <vector>
 
@@ -81,39 +81,50 @@ class FixedPlayer {
   unsigned hold_left_;
 };
 
+namespace runtime {
+inline constexpr const char* fixed_header =
+#include <esokit/target/runtime/fixed.h>
+    ;
+inline constexpr const char* fixed =
+#include <esokit/target/runtime/fixed.c>
+    ;
+}  // namespace runtime
+
 /// The text of a design.
 class FixedText {
  public:
-  explicit FixedText(const FixedDesign& design) : d_(design), design_(design.design()) {}
+  explicit FixedText(const FixedDesign& design)
+      : d_(design), design_(design.design()), text_(design_.options.name, design_.single) {}
 
   [[nodiscard]] CCode code() {
-    const bool controls = design_.is_controller;
-    std::string lists = observe();
-    if (controls) lists += law();
-    if (opens_) {  // What is the same for all settings has a mark.
-      words("");
-      mark = mark_of(lists);
+    const std::string lists = observe();
+    text_.lines("DESIGN_LISTS", design_.is_controller ? lists + law() : lists);
+    set_features();
+    set_constants();
+    set_limits();
+    set_words();
+    set_members();
+    set_rest();
+    set_estimates();
+    set_tables();
+    set_about("");
+    std::string set;
+    if (opens_) {
+      // What is the same for all settings has a mark: all but what comes now.
+      mark = 2166136261u;  // FNV-1a
+      for (const char c : text_.header(runtime::fixed_header) + text_.source({runtime::fixed})) {
+        mark = (mark ^ static_cast<unsigned char>(c)) * 16777619u;
+      }
+      text_.constant("DESIGN_MARK", std::to_string(mark) + "u");
+      text_.replace("esokit_DESIGN_SET", name() + "_" + design_.options.settings_name);
+      set = settings();
+      text_.lines("DESIGN_SET_OF_SETTINGS", set);
     }
-    words(design_.options.settings_name);
-    const auto text = [&](const char* from) { return filled(from, words_); };
-    const std::string set = opens_ ? text(fixed_settings) : "";
-    return {text(fixed_header_head) + (opens_ ? text(fixed_header_settings) : "") +
-                text(controls ? fixed_header_controller : fixed_header_observer) +
-                (opens_ ? text(fixed_header_adopt) : "") + text(fixed_header_tail),
-            text(fixed_source_head) + set + lists + text(fixed_source_gap) +
-                text(controls ? fixed_source_controller : fixed_source_observer) +
-                (opens_ ? text(fixed_source_adopt) : "") + text(fixed_source_self_test),
-            opens_ ? "#include \"" + design_.options.name + ".h\"\n\n" + set : ""};
-  }
-  /// Of the text but for settings and samples.
-  [[nodiscard]] std::uint32_t mark_of(const std::string& lists) const {
-    std::uint32_t found = 2166136261u;  // FNV-1a
-    const char* end = design_.is_controller ? fixed_source_controller : fixed_source_observer;
-    for (const char c : filled("$name $TIME $UNIT_Y $UNIT_U $UNITS$LIMITS$MEMBERS", words_) +
-                            lists + filled(fixed_source_gap, words_) + filled(end, words_)) {
-      found = (found ^ static_cast<unsigned char>(c)) * 16777619u;
-    }
-    return found;
+    set_about(design_.options.comment);
+    set_bounds();
+    set_samples();
+    return {text_.header(runtime::fixed_header), text_.source({runtime::fixed}),
+            opens_ ? "#include \"" + name() + ".h\"\n\n" + set : ""};
   }
   std::uint32_t mark = 0;  ///< of what is the same for all settings
 
@@ -268,91 +279,121 @@ class FixedText {
     }
   }
 
-  void words(const std::string& settings_name) {
-    const std::size_t n = d_.states();
+  [[nodiscard]] const std::string& name() const { return design_.options.name; }
+  template <class One>
+  static std::string listed(std::size_t count, const One& one) {
+    std::string text;
+    for (std::size_t i = 0; i < count; ++i) text += (i > 0 ? ", " : "") + one(i);
+    return text;
+  }
+  /// A bound of a state, in its counts.
+  [[nodiscard]] std::string scaled(const std::vector<double>& bounds, std::size_t i) const {
+    return text_of(static_cast<std::int64_t>(std::ldexp(bounds[i], d_.written.scale[i])));
+  }
+
+  void set_features() {
+    text_.feature("ESOKIT_CONTROLLER", design_.is_controller);
+    text_.feature("ESOKIT_COUNTER", d_.wraps());
+    text_.feature("ESOKIT_SETTINGS", opens_);
+    text_.feature("ESOKIT_RATED", d_.rate > 0);
+    text_.feature("ESOKIT_STAYS_SAFE", design_.loop.stays_safe);
+    text_.feature("ESOKIT_SAFE_INPUT", !design_.loop.holds_safe);
+  }
+  void set_constants() {
     const FixedPointOptions& options = d_.options();
+    const auto y = static_cast<std::size_t>(options.y.most);
+    const auto u = static_cast<std::size_t>(options.u.most);
+    text_.constant("Y_MOST", std::to_string(y));
+    text_.count("Y_MOST_U", y);
+    text_.count("Y_TWICE", 2 * y);
+    text_.constant("U_MOST", std::to_string(u));
+    text_.count("U_MOST_U", u);
+    text_.count("U_TWICE", 2 * u);
+    const std::size_t half = d_.wraps() ? std::size_t{1} << (options.y.counter_bits - 1) : 1;
+    text_.constant("COUNTER_HALF", std::to_string(half));
+    text_.count("COUNTER_HALF_U", half);
+    text_.count("COUNTER_MASK", 2 * half - 1);
+    text_.count("STATES", d_.states());
+    text_.count("COLUMNS", d_.states() + 1);
+    text_.count("ROWS", static_cast<std::size_t>(d_.table_rows()));
+    text_.count("GAINS", gains_.size());
+    text_.constant("SAMPLES", std::to_string(design_.options.self_test_samples));
+  }
+  void set_limits() {
+    const LoopRules& loop = design_.loop;
+    const std::int64_t one = std::int64_t(1) << d_.law_scale;
+    const auto fine = [&](double physical) {
+      return text_of(static_cast<std::int64_t>(std::nearbyint(physical / d_.options().u.unit)) *
+                     one);
+    };
+    text_.constant("LAW_SCALE", std::to_string(d_.law_scale));
+    text_.constant("ONE", text_of(one));
+    text_.constant("HALF", text_of(one / 2));
+    text_.constant("LOWER", lower());
+    text_.constant("UPPER", upper());
+    text_.constant("RATE", rate());
+    text_.constant("SAFE_INPUT", fine(loop.safe_input));
+    text_.constant("HOLD_INPUT", text_of(d_.hold_counts() * one));
+    text_.constant("START_FINE", text_of(d_.start_held() * one));
+    text_.constant("START_HELD", text_of(d_.start_held()));
+    text_.count("HOLD_SAMPLES", loop.hold_left);
+    text_.count("MISSING_LIMIT", loop.missing_limit);
+    text_.constant("FIRST_MODE", loop.hold_left > 0 ? "1u" : "0u");
+  }
+  [[nodiscard]] std::string lower() const {
+    return text_of(static_cast<std::int64_t>(d_.lower) * (std::int64_t(1) << d_.law_scale));
+  }
+  [[nodiscard]] std::string upper() const {
+    return text_of(static_cast<std::int64_t>(d_.upper) * (std::int64_t(1) << d_.law_scale));
+  }
+  [[nodiscard]] std::string rate() const {
+    return text_of(static_cast<std::int64_t>(std::floor(std::ldexp(d_.rate, d_.law_scale))));
+  }
+  void set_words() {
     const bool wraps = d_.wraps();
-    const double of_u = options.u.unit / options.y.unit;
-    const std::string& name = design_.options.name;
-    const std::string upper = begin_of_constants(name);
-
-    std::string bounds;
-    std::string units;
-    std::string estimates;
-    for (std::size_t row = 0; row < d_.estimates.size(); ++row) {
-      const std::string number = std::to_string(row);
-      const auto [c, scale] = unit_of(row);
-      const FixedBound& bound = d_.estimates[row];
-      bounds += " *   estimate " + number + ": " + text_of(bound.deviation) +
-                " (half a count of y: " + text_of(bound.half_count) +
-                "), and by the rounding of the gains " + text_of(bound.by_gains) + "\n";
-      units +=
-          "#define $NAME_ESTIMATE_" + number + "_UNIT (" + text_of(std::ldexp(c, -scale)) + ")\n";
-      std::string sum;
-      for (std::size_t i = 0; i < n; ++i) {
-        if (!(std::fabs(d_.written.estimates[row][i]) > 0)) continue;
-        const int down = d_.written.scale[i] - scale;
-        const std::string x = "o->x[" + std::to_string(i) + "]";
-        sum += (sum.empty() ? "" : " + ") +
-               (down > 0 ? "(" + x + " >> " + std::to_string(down) + ")" : x);
-      }
-      estimates += "  case " + number + "u:\n    value = " + sum + ";\n    break;\n";
-    }
-    if (design_.is_controller) {
-      bounds += " *   u before its limits: " + text_of(d_.input.deviation) +
-                " counts (half a count of y: " + text_of(d_.input.half_count) +
-                "), and by the rounding of the gains " + text_of(d_.input.by_gains) + "\n";
-    }
-
-    std::string members = "  int32_t x[" + std::to_string(n) + "]; /* in counts of y and 2^-";
-    for (std::size_t i = 0; i < n; ++i)
-      members += (i > 0 ? ", 2^-" : "") + std::to_string(d_.written.scale[i]);
-    members += " */\n";
+    text_.replace("y_count", wraps ? "uint16_t" : "int32_t");
+    text_.replace("DESIGN_ORIGIN", wraps ? "the counter 0" : "y = 0");
+    text_.replace("DESIGN_Y", wraps ? "y less the last counter" : "y");
+    text_.replace("DESIGN_LAST", std::to_string(design_.size - 1));
+    text_.replace("DESIGN_COLUMNS",
+                  design_.is_controller ? "y, r, u" : "y, u, the last word of the state");
+  }
+  void set_members() {
+    const std::size_t n = d_.states();
+    std::string members =
+        "  int32_t x[" + std::to_string(n) + "]; /* in counts of y and 2^-" +
+        filled(listed(n, [&](std::size_t i) { return std::to_string(d_.written.scale[i]); }),
+               {{", ", ", 2^-"}}) +
+        " */\n";
     std::string forget;
     for (std::size_t i = 0; i < n; ++i) {
       if (d_.next_rest[i] < 0) continue;
-      const std::string rest = "rest" + std::to_string(i);
-      members +=
-          "  int32_t " + rest + "; /* of x[" + std::to_string(i) + "], below its last bit */\n";
-      forget += "  o->" + rest + " = 0;\n";
+      const std::string number = std::to_string(i);
+      members += "  int32_t rest" + number + "; /* of x[" + number + "], below its last bit */\n";
+      forget += "  o->rest" + number + " = 0;\n";
     }
-    if (wraps) members += "  uint16_t y_last; /* the counter */\n";
-
-    if (opens_) members += "  const " + name + "_settings *settings;\n";
-    std::string reach;
-    std::string box;
-    for (std::size_t i = 0; i < n; ++i) {
-      reach += (i > 0 ? ", " : "") +
-               text_of(static_cast<std::int64_t>(std::ldexp(d_.reach[i], d_.written.scale[i])));
-      box += (i > 0 ? ", " : "") +
-             text_of(static_cast<std::int64_t>(std::ldexp(d_.box[i], d_.written.scale[i])));
-    }
-    std::string predict_m;
-    std::string predict_p;
-    matrix(d_.rows_of("predict_step", {FixedDesign::column}), of_u, predict_m, predict_p, "    ");
-    std::string correct_m;
-    std::string correct_p;
-    for (int row = 0; row < d_.table_rows(); ++row) {
-      const auto rows = d_.correction_rows(row + 1);
-      correct_m += "    {\n";
-      correct_p += "    {\n";
-      matrix(rows, 1, correct_m, correct_p, "      ");
-      correct_m += "    },\n";
-      correct_p += "    },\n";
-    }
-    std::string rest_at;
+    if (d_.wraps()) members += "  uint16_t y_last; /* the counter */\n";
+    if (opens_) members += "  const " + name() + "_settings *settings;\n";
+    text_.lines("DESIGN_MEMBERS", members);
+    text_.lines("DESIGN_FORGET", forget);
+  }
+  /// The states at rest at y under u.
+  void set_rest() {
+    const std::size_t n = d_.states();
+    const bool wraps = d_.wraps();
+    const double of_u = d_.options().u.unit / d_.options().y.unit;
     std::vector<LinearForm> at(n, LinearForm(n + 2, 0.0));
-    if (design_.is_controller)
+    if (design_.is_controller) {
       at = d_.rows_of("rest_at", {FixedDesign::column, FixedDesign::column});
-    else {
+    } else {
       const auto rows = d_.rows_of("restart_at", {FixedDesign::column});
       for (std::size_t i = 0; i < n; ++i) at[i][n] = rows[i][n];
     }
+    std::string rest_at;
     for (std::size_t i = 0; i < n; ++i) {
       std::string sum;
       const double scale = std::ldexp(1.0, d_.written.scale[i]);
-      for (int input = 0; input < 2; ++input) {
-        if (input == 0 && wraps) continue;
+      for (int input = wraps ? 1 : 0; input < 2; ++input) {
         const double c =
             at[i][n + static_cast<std::size_t>(input)] * (input == 0 ? 1.0 : of_u) * scale;
         if (!(std::fabs(c) > 0)) continue;
@@ -365,31 +406,92 @@ class FixedText {
                std::to_string(power) + ")";
       }
       const std::string number = std::to_string(i);
-      rest_at += "  o->x[" + number + "] = " +
-                 (sum.empty() ? std::string("0")
-                              : "within(" + sum + ", " +
-                                    (opens_ ? "o->settings->box[" + number + "]"
-                                            : text_of(static_cast<std::int64_t>(
-                                                  std::ldexp(d_.box[i], d_.written.scale[i])))) +
-                                    ", &status)") +
+      const std::string most = opens_ ? "o->settings->box[" + number + "]" : scaled(d_.box, i);
+      rest_at += "  o->x[" + number +
+                 "] = " + (sum.empty() ? "0" : "within(" + sum + ", " + most + ", &status)") +
                  ";\n";
     }
-
-    const std::string y_most = std::to_string(options.y.most);
-    const std::string y_twice = std::to_string(2 * options.y.most);
-    const std::string half = std::to_string(wraps ? 1 << (options.y.counter_bits - 1) : 0);
-    const std::string mask = std::to_string(wraps ? (1 << options.y.counter_bits) - 1 : 0);
-    // The change of a counter, and of a reference from it.
-    const auto change = [&](const std::string& of, const std::string& kind,
-                            const std::string& now) {
-      return "  const uint32_t " + of + "_bits = (((uint32_t)" + now + " - o->y_last) & " + mask +
-             "u) ^ " + half + "u;\n  " + kind + of + " = (int32_t)" + of + "_bits - " + half +
-             ";\n";
+    text_.lines("DESIGN_REST_AT", rest_at);
+  }
+  void set_estimates() {
+    std::string units;
+    std::string estimates;
+    const std::string upper = begin_of_constants(name());
+    for (std::size_t row = 0; row < d_.estimates.size(); ++row) {
+      const std::string number = std::to_string(row);
+      const auto [c, scale] = unit_of(row);
+      units += "#define " + upper + "_ESTIMATE_" + number + "_UNIT (" +
+               text_of(std::ldexp(c, -scale)) + ")\n";
+      std::string sum;
+      for (std::size_t i = 0; i < d_.states(); ++i) {
+        if (!(std::fabs(d_.written.estimates[row][i]) > 0)) continue;
+        const int down = d_.written.scale[i] - scale;
+        const std::string x = "o->x[" + std::to_string(i) + "]";
+        sum += (sum.empty() ? "" : " + ") +
+               (down > 0 ? "(" + x + " >> " + std::to_string(down) + ")" : x);
+      }
+      estimates += "  case " + number + "u:\n    value = " + sum + ";\n    break;\n";
+    }
+    text_.lines("DESIGN_UNITS", units);
+    text_.lines("DESIGN_ESTIMATES", estimates);
+  }
+  void set_tables() {
+    const double of_u = d_.options().u.unit / d_.options().y.unit;
+    std::string m;
+    std::string powers;
+    matrix(d_.rows_of("predict_step", {FixedDesign::column}), of_u, m, powers, "    ");
+    text_.lines("DESIGN_PREDICT_M", m);
+    text_.lines("DESIGN_PREDICT_P", powers);
+    for (int row = 0; row < d_.table_rows(); ++row) {
+      correct_m_ += "    {\n";
+      correct_p_ += "    {\n";
+      matrix(d_.correction_rows(row + 1), 1, correct_m_, correct_p_, "      ");
+      correct_m_ += "    },\n";
+      correct_p_ += "    },\n";
+    }
+    text_.lines("DESIGN_CORRECT_M", correct_m_);
+    text_.lines("DESIGN_CORRECT_P", correct_p_);
+    text_.replace("DESIGN_REACH", reach());
+    text_.replace("DESIGN_BOX", box());
+  }
+  [[nodiscard]] std::string reach() const {
+    return listed(d_.states(), [&](std::size_t i) { return scaled(d_.reach, i); });
+  }
+  [[nodiscard]] std::string box() const {
+    return listed(d_.states(), [&](std::size_t i) { return scaled(d_.box, i); });
+  }
+  [[nodiscard]] std::string settings() const {
+    std::string set =
+        "const " + name() + "_settings " + name() + "_" + design_.options.settings_name +
+        " = {\n  " + std::to_string(mark) + "u,\n  {" +
+        listed(gains_.size(), [&](std::size_t i) { return std::to_string(gains_[i]); }) +
+        "},\n  {" + reach() + "},\n  {" + box() + "},\n";
+    if (design_.is_controller) set += "  " + lower() + ",\n  " + upper() + ",\n";
+    if (d_.rate > 0) set += "  " + rate() + ",\n";
+    return set + "  {\n" + correct_m_ + "  },\n  {\n" + correct_p_ + "  }\n};\n\n";
+  }
+  void set_about(const std::string& comment) {
+    const FixedPointOptions& options = d_.options();
+    text_.lines("DESIGN_ABOUT", (comment.empty() ? "" : " * " + comment + "\n") +
+                                    " * T = " + text_of(design_.sample_time) +
+                                    " s; fixed point: a count of y is " + text_of(options.y.unit) +
+                                    ", a count of u " + text_of(options.u.unit) + ".\n");
+  }
+  void set_bounds() {
+    const auto of = [](const FixedBound& bound, const char* unit) {
+      return text_of(bound.deviation) + unit + " (half a count of y: " + text_of(bound.half_count) +
+             "), and by the rounding of the gains " + text_of(bound.by_gains) + "\n";
     };
-    const std::string of_y =
-        wraps ? change("y", "const int32_t ", "given") : "  const int32_t y = given;\n";
-    const std::string in_range = "((uint32_t)y + " + y_most + "u) <= " + y_twice + "u";
-
+    std::string bounds;
+    for (std::size_t row = 0; row < d_.estimates.size(); ++row) {
+      bounds += " *   estimate " + std::to_string(row) + ": " + of(d_.estimates[row], "");
+    }
+    if (design_.is_controller) bounds += " *   u before its limits: " + of(d_.input, " counts");
+    text_.lines("DESIGN_BOUNDS", bounds);
+  }
+  void set_samples() {
+    const FixedPointOptions& options = d_.options();
+    const bool wraps = d_.wraps();
     std::string vectors;
     FixedPlayer player(d_);
     std::uint32_t seed = 1;
@@ -398,8 +500,7 @@ class FixedText {
       seed = seed * 1664525u + 1013904223u;
       return static_cast<std::int64_t>(seed >> 8) % (2 * most + 1) - most;
     };
-    const int samples = design_.options.self_test_samples;
-    for (int k = 0; k < samples; ++k) {
+    for (int k = 0; k < design_.options.self_test_samples; ++k) {
       const std::int64_t y = drawn(options.y.most);
       counter = (counter + y) & ((std::int64_t(1) << 16) - 1);
       if (wraps) counter &= (std::int64_t(1) << options.y.counter_bits) - 1;
@@ -412,146 +513,21 @@ class FixedText {
         if (wraps) second = (counter + second) & ((std::int64_t(1) << options.y.counter_bits) - 1);
       } else {
         player.observe(y, second);
-        result = player.next_word(n - 1);
+        result = player.next_word(d_.states() - 1);
       }
       vectors += "    {" + text_of(wraps ? counter : y) + ", " + text_of(second) + ", " +
                  text_of(result) + "},\n";
     }
-
-    const LoopRules& loop = design_.loop;
-    const std::int64_t one = std::int64_t(1) << d_.law_scale;
-    const auto fine = [&](double physical) {
-      return text_of(static_cast<std::int64_t>(std::nearbyint(physical / options.u.unit)) * one);
-    };
-    std::string rate;
-    const std::string lower = text_of(static_cast<std::int64_t>(d_.lower) * one);
-    const std::string highest = text_of(static_cast<std::int64_t>(d_.upper) * one);
-    std::string limits;
-    std::string limit_values;
-    if (design_.is_controller) {
-      limits = "  int32_t lower; /* of u, in 2^-$LAW_SCALE counts */\n  int32_t upper;\n";
-      limit_values = "  " + lower + ",\n  " + highest + ",\n";
-    }
-    if (d_.rate > 0) {
-      std::string step =
-          text_of(static_cast<std::int64_t>(std::floor(std::ldexp(d_.rate, d_.law_scale))));
-      limits += "  int32_t rate; /* a sample */\n";
-      limit_values += "  " + step + ",\n";
-      if (opens_) step = "o->settings->rate";
-      rate = "  if (u > (o->u_last + " + step + ")) {\n    u = o->u_last + " + step + ";\n  }\n" +
-             "  if (u < (o->u_last - " + step + ")) {\n    u = o->u_last - " + step + ";\n  }\n";
-    }
-    const std::string flagged =
-        ";\n    o->status = (uint8_t)(o->status | $NAME_REFERENCE_REJECTED);\n  }\n";
-    const std::string clamp_r = wraps ? ""
-                                      : "  if (r > " + y_most + ") {\n    r = " + y_most + flagged +
-                                            "  if (r < -" + y_most + ") {\n    r = -" + y_most +
-                                            flagged;
-    std::string gain;
-    for (const std::int32_t one_gain : gains_) {
-      gain += (gain.empty() ? "" : ", ") + std::to_string(one_gain);
-    }
-    const auto table = [](const std::string& what) {
-      return "  static const int32_t most[$N] = {" + what + "};\n";
-    };
-    const std::string type = wraps ? "uint16_t" : "int32_t";
-    const auto& comment = design_.options.comment;
-    words_ = {{"$include", "#include"},
-              {"$REACH_TABLE", opens_ ? "" : table("$REACH")},
-              {"$CORRECT_TABLES",
-               opens_ ? ""
-                      : "  static const int32_t m[$ROWS][$N][$N1] = { /* after 1, 2, .. samples "
-                        "*/\n$CORRECT_M  };\n  static const uint8_t powers[$ROWS][$N][$N1] = "
-                        "{\n$CORRECT_P  };\n" +
-                            table("$BOX")},
-              {"$GAINS_OF", opens_ ? "o->settings->correct[elapsed - 1u], "
-                                     "o->settings->powers[elapsed - 1u]"
-                                   : "m[elapsed - 1u], powers[elapsed - 1u]"},
-              {"$REACH_OF", opens_ ? "o->settings->reach" : "most"},
-              {"$BOX_OF", opens_ ? "o->settings->box" : "most"},
-              {"$LOWER_OF", opens_ ? "o->settings->lower" : lower},
-              {"$UPPER_OF", opens_ ? "o->settings->upper" : highest},
-              {"$LIMITS", limits},
-              {"$LIMIT_VALUES", limit_values},
-              {"$GAINS", std::to_string(gains_.size())},
-              {"$GAIN", gain},
-              {"$MEMBERS", members},
-              {"$TIME", text_of(design_.sample_time)},
-              {"$UNIT_Y", text_of(options.y.unit)},
-              {"$UNIT_U", text_of(options.u.unit)},
-              {"$BOUNDS", bounds},
-              {"$UNITS", units},
-              {"$LAW_SCALE", std::to_string(d_.law_scale)},
-              {"$AT_REST", wraps ? "the counter 0" : "y = 0"},
-              {"$Y_TYPE", type},
-              {"$LAST", std::to_string(design_.size - 1)},
-              {"$OF_R",
-               wraps ? change("r", "const int32_t ", "reference") : "  int32_t r = reference;\n"},
-              {"$RELATIVE", wraps ? " less the last counter" : ""},
-              {"$FORGET", forget},
-              {"$REST_AT", rest_at},
-              {"$PREDICT_M", predict_m},
-              {"$PREDICT_P", predict_p},
-              {"$CORRECT_M", correct_m},
-              {"$CORRECT_P", correct_p},
-              {"$REACH", reach},
-              {"$BOX", box},
-              {"$ROWS", std::to_string(d_.table_rows())},
-              {"$U_MOST", std::to_string(options.u.most)},
-              {"$U_TWICE", std::to_string(2 * options.u.most)},
-              {"$OF_Y_SLOWLY", of_y},
-              {"$OF_Y_RESET", wraps ? "" : of_y},
-              {"$OF_Y", of_y},
-              {"$IF_Y", wraps ? "" : "if (" + in_range + ") "},
-              {"$REFUSE_Y", wraps ? ""
-                                  : "  if (((uint32_t)y + " + y_most + "u) > " + y_twice +
-                                        "u) {\n    return $NAME_MEASUREMENT_REJECTED;\n  }\n"},
-              {"$Y_IN_GAP_RANGE", wraps ? "((uint32_t)y + ((uint32_t)elapsed * " + y_most +
-                                              "u)) <= ((uint32_t)elapsed * " + y_twice + "u)"
-                                        : in_range},
-              {"$Y_OUT", "(((uint32_t)y + " + y_most + "u) > " + y_twice + "u)"},
-              {"$Y_ABSOLUTE", wraps ? "0" : "y"},
-              {"$NEW_Y", wraps ? "    o->y_last = given;\n" : ""},
-              {"$ESTIMATES", estimates},
-              {"$INIT", std::string(opens_ ? "  o->settings = &$name_$SET;\n" : "") +
-                            (wraps ? "  o->y_last = 0u;\n" : "")},
-              {"$RATE_LIMIT", rate},
-              {"$HALF", text_of(one / 2)},
-              {"$ONE", text_of(one)},
-              {"$CLAMP_R", clamp_r},
-              {"$MISSING_LIMIT", std::to_string(loop.missing_limit)},
-              {"$LEAVE_SAFE", loop.stays_safe ? ""
-                                              : "  if ((o->mode == $NAME_SAFE) && (o->gap < 1u)) "
-                                                "{\n    o->mode = $NAME_RUNNING;\n  }\n"},
-              {"$SAFE_INPUT", loop.holds_safe ? "o->u_last" : fine(loop.safe_input)},
-              {"$HOLD_INPUT", text_of(d_.hold_counts() * one)},
-              {"$START_FINE", text_of(d_.start_held() * one)},
-              {"$START_HELD", text_of(d_.start_held())},
-              {"$HOLD_LEFT", std::to_string(loop.hold_left)},
-              {"$MODE", loop.hold_left > 0 ? "$NAME_START_HOLD" : "$NAME_RUNNING"},
-              {"$VECTORS", vectors},
-              {"$SAMPLES", std::to_string(samples)},
-              {"$COLUMNS", design_.is_controller ? "y, r, u" : "y, u, the last word of the state"},
-              {"$RESULT", design_.is_controller
-                              ? "const int32_t result = $name_update(&o, (" + type +
-                                    ")samples[i][0], (" + type + ")samples[i][1]);"
-                              : "const int32_t result =\n        ($name_update(&o, (" + type +
-                                    ")samples[i][0], samples[i][1]) == 0u) ? o.x[" +
-                                    std::to_string(n - 1) + "] : (samples[i][2] - 1);"},
-              {"$N1", std::to_string(n + 1)},
-              {"$NAME", upper},
-              {"$N", std::to_string(n)},
-              {"$SET", settings_name},
-              {"$MARK", std::to_string(mark)},
-              {"$name", name},
-              {"$COMMENT", comment.empty() ? "" : " * " + comment + "\n"}};
+    text_.lines("DESIGN_VECTORS", vectors);
   }
 
   const FixedDesign& d_;
   const RecordedDesign& design_;
   bool opens_ = !design_.settings.empty();
   std::vector<std::int32_t> gains_;  ///< that may be changed while it runs
-  Words words_;
+  std::string correct_m_{};
+  std::string correct_p_{};
+  RuntimeText text_;
 };
 
 }  // namespace detail

@@ -111,7 +111,7 @@ requires std::same_as<S, typename Controller::scalar_type> Expected<CCode, Error
   text.replace("DESIGN_ROW", std::to_string(Controller::order));
   text.lines("DESIGN_ABOUT", options.comment.empty() ? "" : " * " + options.comment + "\n");
   return CCode{text.header(detail::runtime::health_header),
-               text.source(text.part(detail::runtime::health)),
+               text.source({detail::runtime::head, detail::runtime::health}),
                {}};
 }
 

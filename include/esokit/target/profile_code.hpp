@@ -97,7 +97,7 @@ Expected<CCode, Error<S>> to_c(const SmoothProfile<Order, S>& profile,
   text.lines("DESIGN_POLYNOMIALS", polynomials);
   text.lines("DESIGN_VECTORS", vectors);
   return CCode{text.header(detail::runtime::profile_header),
-               text.source(text.part(detail::runtime::profile)),
+               text.source({detail::runtime::head, detail::runtime::profile}),
                {}};
 }
 

@@ -77,14 +77,21 @@ class RuntimeText {
     for (const auto& [name, value] : constants_) placed.replace(name, value);
     return placed.part(file);
   }
-  /// A source: a head with the constants that the rest uses, and the rest.
-  [[nodiscard]] std::string source(const std::string& rest) {
+  /// A source of some files: DESIGN_CONSTANTS are the constants that they use.
+  [[nodiscard]] std::string source(const std::vector<const char*>& files) {
+    lines("DESIGN_CONSTANTS", "");
     std::string used;
+    const std::string without = parts(files);
     for (const auto& [name, value] : constants_) {
-      if (uses(rest, name)) used += "#define " + name + " " + value + "\n";
+      if (uses(without, name)) used += "#define " + name + " " + value + "\n";
     }
     lines("DESIGN_CONSTANTS", used.empty() ? used : used + "\n");
-    return part(runtime::head) + rest;
+    return parts(files);
+  }
+  [[nodiscard]] std::string parts(const std::vector<const char*>& files) {
+    std::string text;
+    for (const char* file : files) text += part(file);
+    return text;
   }
 
   /// The part of a file that the design has.
