@@ -124,7 +124,7 @@ TEST(Limiter, WhatWaitsIsKeptByAdopt) {
   limiter.track(2500);
   float u = 0;
   for (int k = 0; k < 100'000; ++k) {
-    limiter.adopt(k % 2 == 0 ? fresh : longer);
+    limiter.adopt(k % 2 == 0 ? fresh : longer, limiter.last());
     u = limiter(0);
   }
   EXPECT_NEAR(u, 2485, 2e-3);

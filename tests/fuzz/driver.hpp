@@ -187,6 +187,7 @@ class Driver final : public Game {
 
   /// A controller put out u; `from` is what was commanded before.
   void put_out(S u, S from) {
+    elsewhere_ = false;
     if (!is_finite(u)) return fail("u is not finite");
     check_limits(config_.limits, u, from);
   }
@@ -792,6 +793,7 @@ class Driver final : public Game {
     add(a, "reset", [](Driver& d) {
       const S y = d.number();
       d.refusable([&] { return d.object_->reset(y); });
+      if (d.accepted_) d.elsewhere_ = false;
     });
   }
 

@@ -100,6 +100,8 @@ class Limiter {
     held_ = output;
     // Without a rate limit the bounds do not change.
     if (rate_limited_ == false) return;
+    // What waits belongs to the last output.
+    waiting_ = select(output < commanded_, S(0.0), select(commanded_ < output, S(0.0), waiting_));
     reach(output, larger(S(step_ + waiting_), S(0.0)));
   }
 
@@ -137,11 +139,14 @@ class Limiter {
 
   /// Takes over the limits of `fresh`; what is held is kept. @param command the last output, as
   /// `commanded` gives it
-  constexpr void adopt(const Limiter& fresh, const S& command) noexcept {
+  constexpr void adopt(const Limiter& fresh, S command) noexcept {
     const S held = held_, waiting = waiting_;
     *this = fresh;
-    waiting_ = select(is_coarse(), S(0.0), waiting);
-    track(command);
+    held_ = command;
+    if (!(rate_limited_ == false)) {
+      waiting_ = select(is_coarse(), S(0.0), waiting);
+      reach(command, larger(S(step_ + waiting_), S(0.0)));
+    }
     applied(held, false);
   }
 
@@ -191,7 +196,7 @@ class Limiter {
     // Further away than a step: something else commanded it. And a lane may need no waiting.
     waiting_ = smaller(select(left < -digit, S(0.0), left), digit);
     waiting_ = select(is_coarse(), S(0.0), waiting_);
-    track(output);
+    reach(output, larger(S(step_ + waiting_), S(0.0)));
     return output;
   }
 
