@@ -287,14 +287,6 @@ TEST(SmoothProfile, GoesOnFromASnapshotWithTheSameBits) {
   expect_same_life<4, double>();
 }
 
-// Plain scalars only, and the type says so: the branches of a move are those of one reference.
-template <class S>
-concept HasProfile = requires {
-  typename SmoothProfile<2, S>;
-};
-static_assert(HasProfile<float> && HasProfile<double>);
-static_assert(!HasProfile<esokit::Pack<double, 2>>);
-
 TEST(SmoothProfile, RefusesByRule) {
   const SmoothProfileConfig<2> good{.limits = {{0, 1}}, .sample_time = 1e-3};
   const auto refused = [&](auto change) {
