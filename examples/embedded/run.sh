@@ -498,7 +498,8 @@ for core in cortex-m4f cortex-m7; do
   limit "$core: bytes of the C of Adrc<LinearEso<2>>" "$(written_bytes "$core" loop)" 1433
   limit "$core: instructions of the C of LinearEso<2>" \
     "$(value "$out/$core-written_c.txt" count eso 3)" 50
-  limit "$core: bytes of the whole image" "$(text_bytes "$core" firmware)" 69632
+  # The step of Adrc stands where it is called, in each of its forms: faster by 3 %, larger by 6 KB in all.
+  limit "$core: bytes of the whole image" "$(text_bytes "$core" firmware)" 77824
 done
 
 # The C in integers: LinearEso, with 16 bits, Adrc, LinearEso with settings in a struct.
