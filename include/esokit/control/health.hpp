@@ -96,10 +96,11 @@ template <PlainScalar S>
   const bool behind = static_cast<double>(health.bounded) > 0.02;
   const bool unseen = !(large < 0) && !(large > 0);
   // An old rho is no evidence. Nor is the time of small moves, if one large one makes the rho.
-  const bool small = unseen && rho < limits.wrong_sign;
+  const bool by_small_moves = unseen && rho < limits.wrong_sign;
   return ((behind ? rho < 0 : reversed) && evidence >= 1 &&
           static_cast<double>(health.opposed) >= limits.opposed) ||
-         ((small || (reversed && rho < limits.wrong_sign)) && evidence >= limits.evidence_of_sign);
+         ((by_small_moves || (reversed && rho < limits.wrong_sign)) &&
+          evidence >= limits.evidence_of_sign);
 }
 
 }  // namespace detail
