@@ -11,7 +11,6 @@
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/control/predictive_adrc.hpp>
 #include <esokit/control/tracking_differentiator.hpp>
-#include <esokit/gain/pole_set.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/half_gain_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
@@ -35,7 +34,8 @@ struct Pendulum {
 };
 
 template class LinearEso<3, float, 2>;
-template class LinearEso<2, float, 1, PoleSet>;
+// Not LinearEso by a PoleSet, whose make computes the longest gap in double: once, where it is
+// designed.
 template class NonlinearEso<2, float, 1, FalGain<float>>;
 template class MimoExtendedStateFilter<ChainOrders<2, 1>, 2, float>;
 
