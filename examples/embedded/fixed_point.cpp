@@ -53,8 +53,9 @@ struct Integers {
   /// dhat in its unit.
   [[nodiscard]] double disturbance() const {
     const std::size_t last = code.written.scale.size() - 1;
-    return std::ldexp(static_cast<double>(player.next_word(last)) * code.written.estimates[last][last],
-                      -code.written.scale[last]);
+    return std::ldexp(
+        static_cast<double>(player.next_word(last)) * code.written.estimates[last][last],
+        -code.written.scale[last]);
   }
 
   FixedCode code;

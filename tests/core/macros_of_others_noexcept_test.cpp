@@ -1,6 +1,6 @@
-// Macros of other people's headers, defined before ours, do no harm. (Before the standard library and
-// Eigen they do: that is theirs to say.) Each is no C++ here: used once in any of our headers, it is an
-// error, in a template that nobody instantiates, too.
+// Macros of other people's headers, defined before ours, do no harm. (Before the standard library
+// and Eigen they do: that is theirs to say.) Each is no C++ here: used once in any of our headers,
+// it is an error, in a template that nobody instantiates, too.
 #include <Eigen/Dense>
 #include <algorithm>
 #include <array>
@@ -46,7 +46,7 @@
 #include <format>
 #endif
 
-#include "macros_of_others.hpp"  // of macros_of_others.txt, written by CMake
 #include "all_headers.hpp"       // every header of esokit, likewise
+#include "macros_of_others.hpp"  // of macros_of_others.txt, written by CMake
 
 int main() { return 0; }

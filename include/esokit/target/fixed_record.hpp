@@ -332,7 +332,8 @@ class FixedRecord {
   bool takes_limits() {
     lower = design_->lower / options_.u.unit;
     upper = design_->upper / options_.u.unit;
-    const double digit = design_->single ? static_cast<double>(rounding<float>()) : rounding<double>();
+    const double digit =
+        design_->single ? static_cast<double>(rounding<float>()) : rounding<double>();
     for (const double count : {lower, upper}) {
       if (std::fabs(count - std::nearbyint(count)) > 1e-6 + 4 * digit * std::fabs(count)) {
         return refuse("u.unit", count, "must make the limits of the controller whole counts");

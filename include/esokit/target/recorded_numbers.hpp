@@ -18,9 +18,9 @@ struct CodeOptions {
                                     ///< small letter, none of a header of C (`math`); in Structured
                                     ///< Text none of its words. Its capitals begin the constants,
                                     ///< of a name with capitals itself
-  std::string comment{};        ///< at the head: which machine, which design; no marks of a
-                                ///< comment, no backslash at the end of a line
-  int self_test_samples = 100;  ///< samples of the self-test, 1 .. 10000
+  std::string comment{};            ///< at the head: which machine, which design; no marks of a
+                                    ///< comment, no backslash at the end of a line
+  int self_test_samples = 100;      ///< samples of the self-test, 1 .. 10000
   bool watched = false;  ///< keeps what a HealthMonitor looks at: innovation, and u that was asked
 
   /// Gains, those of the law, and limits in a struct that can be changed while it runs, instead of
