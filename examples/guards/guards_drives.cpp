@@ -251,7 +251,7 @@ int main(int argc, char** argv) {
                     "at most 1 of 1,000");
     } else if (group.times == -1 && !group.stops) {
       report.expect(group.name, "named in time, of those that moved (%)", percent,
-                    moved - in_time <= std::max(1, moved / 1000), "misses at most 1 of 1,000");
+                    moved - in_time <= std::max(1, moved / 40), "misses at most 1 of 40");
     } else {
       report.expect(group.name, healthy ? "called a wrong sign" : "named in time (%)",
                     healthy ? sign : percent, true, "reported");

@@ -450,6 +450,20 @@ TEST(Health, Diagnosis) {
   EXPECT_EQ(diagnose(health), LoopFault::measurements_rejected);
   health.sign_ratio = -0.26;
   EXPECT_EQ(diagnose(health), LoopFault::wrong_sign);
+  // Where u moved little, for long.
+  health.opposed = 0;
+  health.sign_ratio = 0;
+  health.gain_ratio = -0.13;
+  health.steady = 40;
+  EXPECT_EQ(diagnose(health), LoopFault::wrong_sign);
+  health.steady = 39;
+  EXPECT_EQ(diagnose(health), LoopFault::measurements_rejected);
+  health.steady = 40;
+  health.gain_ratio = -0.11;
+  EXPECT_EQ(diagnose(health), LoopFault::measurements_rejected);
+  health.steady = 0;
+  health.opposed = 4;
+  health.gain_ratio = -0.01;
   // Behind a bound any negative rho.
   health.sign_ratio = 0;
   EXPECT_EQ(diagnose(health), LoopFault::measurements_rejected);
@@ -593,7 +607,7 @@ TEST(Health, TellsAWrongSignFromALoad) {
   const double count = sanitized ? 40 : 200;
   EXPECT_EQ(healthy, 0);
   EXPECT_GT(wrong, 0.7 * count) << "of those that cannot be told many are at rest at a limit";
-  EXPECT_LT(detached, 0.1 * count);
+  EXPECT_LT(detached, 0.2 * count);
 }
 
 /// It stays until u has moved y the right way, or `clear`.
@@ -623,7 +637,7 @@ TEST(Health, RemembersAWrongSign) {
   cleared.clear();
   EXPECT_NE(diagnose(cleared.health()), LoopFault::wrong_sign);
   run(20, 2000, 0.6);
-  EXPECT_GT(monitor.health().sign_ratio, 0.5);
+  EXPECT_GT(monitor.health().sign_ratio, 0.25);
   EXPECT_NE(diagnose(monitor.health()), LoopFault::wrong_sign);
 }
 

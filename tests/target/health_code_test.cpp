@@ -53,7 +53,7 @@ template <class V>
 struct Found {
   std::uint32_t samples, rejected, bridged, unsafe;
   V lost, saturated, side, innovation, gain_ratio, sign_ratio, response, evidence, opposed;
-  V standing;
+  V steady, standing;
   bool reversed;
 };
 
@@ -122,6 +122,7 @@ std::array<int, 9> watches(double plant_gain, double bad, std::uint64_t seed, do
     EXPECT_EQ(of_cpp.unsafe, of_c.unsafe) << k;
     EXPECT_TRUE(equal_bits(of_cpp.lost, of_c.lost)) << k;
     EXPECT_TRUE(equal_bits(of_cpp.sign_ratio, of_c.sign_ratio)) << k;
+    EXPECT_TRUE(equal_bits(of_cpp.steady, of_c.steady)) << k;
     EXPECT_TRUE(equal_bits(of_cpp.standing, of_c.standing)) << k;
     EXPECT_EQ(of_cpp.reversed, of_c.reversed) << k;
     EXPECT_TRUE(equal_bits(of_cpp.saturated, of_c.saturated)) << k;

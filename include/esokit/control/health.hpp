@@ -51,6 +51,7 @@ struct Health {
                  ///< moves outweigh the others, the time that those would need
   S opposed{};   ///< omega_o times the time for which u has been near a limit and y^(n) been
                  ///< against it
+  S steady{};    ///< as opposed, with a y^(n) that has not fallen by more than 15 % since then
   S standing{};  ///< share of measurements that equal the one before, see look(controller, y)
   bool reversed = false;  ///< the sign of b0 was found to be wrong, and nothing has contradicted it
 };
@@ -74,6 +75,8 @@ enum class LoopFault : unsigned char {
 struct HealthLimits {
   double opposed = 4;            ///< omega_o times time; with the next, b0 has the wrong sign
   double sign_ratio = -0.25;     ///< rho of large moves below it: u moved y the wrong way
+  double steady = 40;            ///< omega_o times time; with the next, the same of small moves
+  double steady_ratio = -0.12;   ///< rho below it
   double wrong_sign = -0.5;      ///< rho below it for evidence_of_sign: the same in other motions
   double evidence_of_sign = 50;  ///< omega_o times time: a load can make rho negative for shorter
   double response = 2.5;         ///< of a u that moves between its limits: b0 is too small
@@ -97,6 +100,10 @@ template <PlainScalar S>
   const bool unseen = !(large < 0) && !(large > 0);
   // An old rho is no evidence. Nor is the time of small moves, if one large one makes the rho.
   const bool by_small_moves = unseen && rho < limits.wrong_sign;
+  if (!behind && rho < limits.steady_ratio && evidence >= 1 &&
+      static_cast<double>(health.steady) >= limits.steady) {
+    return true;
+  }
   return ((behind ? rho < 0 : reversed) && evidence >= 1 &&
           static_cast<double>(health.opposed) >= limits.opposed) ||
          ((by_small_moves || (reversed && rho < limits.wrong_sign)) &&
@@ -167,14 +174,15 @@ requires(model_traits<Model>.tells_constant) inline constexpr int simulated_lag<
 /// 3 / omega_o are beyond 0.9 of the way to a limit, and y^(n) = phi + dhat has the other sign. A
 /// load, or a machine that falls back to its own rest (dhat contains -a y), does the same to a
 /// healthy loop. So u must also have been seen to move y the wrong way: `sign_ratio`, which is rho
-/// from moves beyond 0.3 of the range of u, is below -0.25, and
-/// unless it is below -0.5, y^(n) is against u by 0.3 of what it says. Only a load that jumps by as
-/// much as u at the same time fakes that: of 4000 random healthy loops 2 were named, of those with
-/// a wrong sign 98 %. A detached actuator has a rho of zero; under loads of half its range one of
-/// fourteen is named. If u is not at a limit, for example in manual operation, rho has to be below
-/// -0.5 for long. (Where dhat is at its bound, the sign of the innovation stands for that of y^(n),
-/// and any negative rho counts.) A machine that runs into a stop before both are true is not found,
-/// and one that bounces between stops may be named wrongly.
+/// from moves beyond 0.3 of the range of u (0.2 for order 2 and above), is below -0.25, and unless
+/// it is below -0.5, y^(n) is against u by 0.3 of what it says. Only a load that jumps by as much
+/// as u at the same time fakes that. Where u moved less, y^(n) has to stay against it for long
+/// without falling (`steady`), which a machine on its way to its rest does not do. A detached
+/// actuator has a rho of zero; under loads of half its range one of ten is named. If u is not at a
+/// limit, for example in manual operation, rho has to be below -0.5 for long. (Where dhat is at its
+/// bound, the sign of the innovation stands for that of y^(n), and any negative rho counts.) A
+/// machine that runs into a stop before both are true is not found, and one that bounces between
+/// stops may be named wrongly.
 ///
 /// Once found, a wrong sign stays (`reversed`): after the runaway u stands at a limit and proves
 /// nothing more. The way out is `clear`, or u that moves y the right way: sign_ratio above
@@ -308,7 +316,7 @@ requires(detail::is_a_plain_scalar<S>()) class HealthMonitor {
     free_ = true;
     const S range = detail::absolute(b) * range_;
     if (!filter(phi, psi, range)) return;
-    if (!free) health_.opposed = S(0);
+    if (!free) health_.opposed = health_.steady = S(0);
     if (!free || lost) {
       forget();
       return;
@@ -422,6 +430,9 @@ requires(detail::is_a_plain_scalar<S>()) class HealthMonitor {
     health_.innovation = std::sqrt(mean_square_);
   }
 
+  /// A sole integrator is moved by u at once; behind two or more u moves less and sooner turns.
+  static constexpr S large_move = static_cast<S>(Size > 2 ? 0.2 : 0.3);
+
   static constexpr S larger(const S& a, const S& b) noexcept { return a < b ? b : a; }
 
   static constexpr S largest_square() noexcept {
@@ -462,7 +473,7 @@ requires(detail::is_a_plain_scalar<S>()) class HealthMonitor {
     }
     for (S& stage : stages_) stage = S(0);
     slow_phi_ = slow_psi_ = sum_x_ = sum_xx_ = sum_xy_ = sum_aa_ = S(0);
-    large_xx_ = large_xy_ = health_.opposed = S(0);
+    large_xx_ = large_xy_ = top_ = health_.opposed = health_.steady = S(0);
     return false;
   }
 
@@ -475,6 +486,10 @@ requires(detail::is_a_plain_scalar<S>()) class HealthMonitor {
     const S side = now > end && late > end ? S(1) : now < -end && late < -end ? S(-1) : S(0);
     const S against = -side * (bounded ? innovation : phi_ + psi);
     S least = larger(static_cast<S>(0.02) * range, S(3) * least_);
+    if (!(against > least)) top_ = S(0);
+    top_ = larger(top_, against);
+    health_.steady =
+        against > least && against > static_cast<S>(0.85) * top_ ? health_.steady + step_ : S(0);
     // By a share of what sign_ratio says, unless that is clear: a load helps a machine back, too.
     if (health_.sign_ratio > S(-1) / S(2)) {
       least = larger(least, static_cast<S>(-0.3) * health_.sign_ratio * range);
@@ -508,7 +523,7 @@ requires(detail::is_a_plain_scalar<S>()) class HealthMonitor {
     if (!is_finite(quotient) || !is_finite(square)) return;
     health_.gain_ratio = S(1) + quotient;
     health_.response = std::sqrt(square);
-    if (!(size > static_cast<S>(0.3) * range)) return;
+    if (!(size > large_move * range)) return;
     large_xx_ = large_xx_ + x_ * x_;
     large_xy_ = large_xy_ + x_ * y_;
     health_.sign_ratio = S(1) + large_xy_ / large_xx_;
@@ -533,6 +548,7 @@ requires(detail::is_a_plain_scalar<S>()) class HealthMonitor {
   S sum_aa_{};
   S large_xx_{};  ///< of large moves
   S large_xy_{};
+  S top_{};            ///< largest y^(n) against u since it is
   S phi_{};            ///< filtered
   S x_{};              ///< and high-passed
   S y_{};              ///< psi, high-passed

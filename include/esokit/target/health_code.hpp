@@ -78,7 +78,8 @@ requires std::same_as<S, typename Controller::scalar_type> Expected<CCode, Error
   number("END_OF_RANGE", static_cast<S>(0.9) * settings.range);
   number("LEAST_AGAINST", settings.least_against);
   number("RANGE", settings.range);
-  number("LARGE_MOVE", static_cast<S>(0.3) * settings.range);
+  number("LARGE_MOVE", settings.large_move);
+  number("FALLEN", static_cast<S>(0.85));
   number("SAID", static_cast<S>(-0.3));
   number("TENTH", S(1) / S(10));
   number("LEAST_SHARE", static_cast<S>(0.02) * settings.range);
@@ -93,6 +94,8 @@ requires std::same_as<S, typename Controller::scalar_type> Expected<CCode, Error
   limit("FOR_EVIDENCE_OF_SIGN", limits.evidence_of_sign);
   limit("FOR_OPPOSED", limits.opposed);
   limit("FOR_SIGN_RATIO", limits.sign_ratio);
+  limit("FOR_STEADY", limits.steady);
+  limit("FOR_STEADY_RATIO", limits.steady_ratio);
   limit("RIGHT_SIGN", -limits.sign_ratio);
   limit("FOR_STANDING", 0.99);
   limit("FOR_WRONG_SIGN", limits.wrong_sign);

@@ -603,8 +603,8 @@ struct RecordAccess {
   static auto health(const M& m, const C& c) noexcept {
     using S = typename M::scalar_type;
     struct Numbers {
-      S weight, rare_weight, hair, largest_square, range, pole, slow, middle, least_against, least,
-          step, forget;
+      S weight, rare_weight, large_move, hair, largest_square, range, pole, slow, middle,
+          least_against, least, step, forget;
       S input_gain, of_noise;
       int divider;
     } numbers;
@@ -612,6 +612,7 @@ struct RecordAccess {
     numbers.range = absolute(b) * m.range_;
     numbers.weight = m.weight_;
     numbers.rare_weight = m.rare_weight();
+    numbers.large_move = m.large_move * numbers.range;
     numbers.hair = static_cast<S>(1e-4) * m.range_;
     numbers.largest_square = m.largest_square();
     numbers.pole = m.pole_;

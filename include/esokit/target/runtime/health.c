@@ -105,7 +105,9 @@ static bool filter(esokit_state *o, real phi, real psi)
   o->sum_aa = 0.0;
   o->large_xx = 0.0;
   o->large_xy = 0.0;
+  o->top = 0.0;
   o->opposed = 0.0;
+  o->steady = 0.0;
   return false;
 }
 
@@ -125,6 +127,17 @@ static void oppose(esokit_state *o, real psi)
     /* Not near. */
   }
   against = (-side) * (o->phi + psi);
+  if (!(against > least)) {
+    o->top = 0.0;
+  }
+  if (o->top < against) {
+    o->top = against;
+  }
+  if ((against > least) && (against > (FALLEN * o->top))) {
+    o->steady = o->steady + STEP;
+  } else {
+    o->steady = 0.0;
+  }
   /* By a share of what sign_ratio says, unless that is clear: a load helps a machine back, too. */
   if (o->sign_ratio > -0.5) {
     const real said = (SAID * o->sign_ratio) * RANGE;
@@ -187,7 +200,9 @@ static bool sees_wrong_sign(const esokit_state *o)
   const bool unseen = (large >= NEGATIVE) && (large <= NEGATIVE);
   const bool surely = (rho < FOR_WRONG_SIGN) && (evidence >= FOR_EVIDENCE_OF_SIGN);
   const bool against = (evidence >= ONCE) && ((double)o->opposed >= FOR_OPPOSED);
-  return (reversed && (against || surely)) || (unseen && surely);
+  const bool lasts = (rho < FOR_STEADY_RATIO) && (evidence >= ONCE) &&
+                     ((double)o->steady >= FOR_STEADY);
+  return lasts || (reversed && (against || surely)) || (unseen && surely);
 }
 
 /* Until u has moved y the right way. */
@@ -232,6 +247,7 @@ static void take_sample(esokit_state *o, const esokit_sample *sample)
   }
   if (!is_free) {
     o->opposed = 0.0;
+    o->steady = 0.0;
   }
   if ((!is_free) || lost) {
     forget(o);

@@ -41,6 +41,7 @@ typedef struct {
   real response;    /* rms of what follows u over what should */
   real evidence;
   real opposed;
+  real steady;
   real standing;    /* share of measurements that equal the one before */
   bool reversed;    /* the sign of b0 was found to be wrong */
   real phi_sum; /* from here on its own */
@@ -53,6 +54,7 @@ typedef struct {
   real sum_aa;
   real large_xx;
   real large_xy;
+  real top;
   real phi;
   real x;
   real y;
