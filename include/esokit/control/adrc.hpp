@@ -99,6 +99,7 @@ requires(detail::goes_into_a_loop<Observer>()) class Adrc {
 
   using Config = AdrcConfig<Observer>;  ///< settings of make
   using StatusType = StatusOf<S>;       ///< StepStatus, for a pack one per lane
+
   /// The same with another scalar.
   template <class T>
   requires LoopObserver<detail::WithScalar<Observer, T>>

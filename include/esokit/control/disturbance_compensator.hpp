@@ -63,6 +63,7 @@ requires(detail::goes_into_a_loop<Observer>()) class DisturbanceCompensator {
       .observes = true};
 
   using Config = DisturbanceCompensatorConfig<Observer>;  ///< settings of make
+
   /// The same with another scalar.
   template <class T>
   requires LoopObserver<detail::WithScalar<Observer, T>>

@@ -57,6 +57,7 @@ struct PerLane {
     for (const Word& word : words) differs = static_cast<Word>(differs | (word ^ same));
     return differs == 0;
   }
+  /// Gives each lane the value.
   constexpr PerLane& operator=(T value) noexcept {
     values.fill(value);
     return *this;

@@ -32,6 +32,7 @@ struct CascadeEsoConfig {
 template <int Size, int Levels, Scalar S, ListsPoles Placement, class Settings>
 struct CascadeEsoConfig<Size, Levels, S, Placement, Settings> {
   [[no_unique_address]] ByName<CascadeEsoConfig> by_name{};  ///< nothing to set, see ByName
+
   /// p_i of each level, 1/s; for a pack common to all lanes
   Array<typename Placement::template Spec<Size, LaneScalar<S>>, Levels> level_poles{};
   S input_gain{};                          ///< b0, unit of y^(n) per unit of u; not zero

@@ -29,6 +29,7 @@ struct LinearEsoConfig {
 template <int Size, Scalar S, ListsPoles Placement, class Settings>
 struct LinearEsoConfig<Size, S, Placement, Settings> {
   [[no_unique_address]] ByName<LinearEsoConfig> by_name{};  ///< nothing to set, see ByName
+
   /// p_i, 1/s, N poles in the left half plane, complex ones in conjugate pairs; for a pack common
   /// to all lanes
   typename Placement::template Spec<Size, LaneScalar<S>> poles{};

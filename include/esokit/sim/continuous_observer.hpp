@@ -161,6 +161,7 @@ template <int Size, Scalar S, ListsPoles Placement>
 struct ContinuousLinearEsoConfig<Size, S, Placement> {
   [[no_unique_address]] ByName<ContinuousLinearEsoConfig>
       by_name{};  ///< nothing to set, see ByName
+
   /// p_i, 1/s, N poles in the left half plane, complex ones in conjugate pairs
   typename Placement::template Spec<Size, S> poles{};
   S input_gain{};  ///< b0, unit of y^(n) per unit of u; not zero

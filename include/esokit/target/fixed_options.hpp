@@ -39,6 +39,7 @@ struct FixedPointOptions {
   CodeOptions code{};               ///< name and comment, and whether settings are in a struct
   const FixedCode* settings_for = nullptr;  ///< with CodeOptions::settings_in_struct: the design is
                                             ///< for `name_adopt` of this code, with its scales
+
   /// With CodeOptions::settings_in_struct: other designs, each written alone with these options,
   /// that are to become settings of this code. It takes scales that hold all of them; the gains of
   /// each have fewer bits then, see FixedBound::by_gains.

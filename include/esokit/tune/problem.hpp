@@ -212,6 +212,7 @@ struct TuneRules {
   double gain_factor =
       2.0;  ///< the loop stays stable with b0 too large or too small by this factor
   double phase_margin = 0.0;  ///< smallest phase margin, rad; 0: not required
+
   /// Smallest damping of the poles of the nominal loop, but those of a known sine: no oscillation
   /// lasts, nor does u alternate from sample to sample for long. With 0.1 each period has at most
   /// 53 % of the one before it. 0: not required.
