@@ -152,10 +152,10 @@ start() {
 # One program a line, of one unit: a namespace is called like its file, and what several files
 # instantiate is compiled once.
 units=(
-  "core/pack core/scalar core/lanes core/expected core/check core/matrix core/snapshot math/combinatorics math/fal math/positivity analysis/integrator_chain"
-  "gain/continuous_gain gain/feedback_gain gain/gain_interval gain/riccati observer/named_observer observer/predictor_corrector observer/cascade_identities adapter/outlier_gate"
+  "core/pack core/scalar core/lanes core/expected core/check core/matrix core/snapshot math/combinatorics math/fal math/fine_sum math/positivity analysis/integrator_chain"
+  "gain/continuous_gain gain/covariance_factor gain/feedback_gain gain/gain_interval gain/riccati observer/named_observer observer/predictor_corrector observer/cascade_identities adapter/outlier_gate"
   "observer/pack"
-  "control/adrc_law control/nonlinear_feedback tune/pid_conversion control/retune control/tracking_differentiator control/smooth_profile"
+  "control/adrc_law control/at_limits control/nonlinear_feedback tune/pid_conversion control/retune control/tracking_differentiator control/smooth_profile"
   "control/experiment"
   "sim/plant sim/noise sim/counted_gaussian sim/signals sim/metrics analysis/dense identify/input_checks"
   "sim/runge_kutta model/linear_plant"
