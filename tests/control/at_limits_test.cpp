@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
 #include <esokit/adapter/measured.hpp>
 #include <esokit/adapter/variable_time.hpp>
@@ -29,7 +30,7 @@ constexpr int tries = 2000;
 
 /// i / 10^k, as it is read from a text.
 template <class S>
-S decimal(long i, int k) {
+S decimal(std::int64_t i, int k) {
   static constexpr long powers[] = {1, 10, 100, 1000, 10000, 100000, 1000000, 10000000, 100000000};
   return static_cast<S>(static_cast<long double>(i) / static_cast<long double>(powers[k]));
 }
@@ -262,7 +263,8 @@ void parts() {
     const auto path = [&](const char* what, double share) {
       esokit::MeasuredInput<S> input{.gain = S(1)};
       if (*what == 'l')
-        input.lag = decimal<S>(T * (sizeof(S) == 4 ? 131'072 : 1'000'000), 0) * S(share);
+        input.lag =
+            decimal<S>(T * (sizeof(S) == 4 ? std::int64_t{131'072} : 1'000'000), 0) * S(share);
       if (*what == 'd') input.dead_time = decimal<S>(7 * T, places) * S(share);
       return refusal(
           MeasuredPath<S, 7>::validate(input, *what == 'l' ? decimal<S>(T, 0) : time, -1));
