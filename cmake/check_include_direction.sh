@@ -4,7 +4,8 @@
 # and every header from core to control, what runs in a controller, that needs Eigen or another header
 # that costs more than a controller; an umbrella header that does not include every other header, and a header that reaches C++20 before
 # core/language.hpp, which says that it is needed. The C in target/runtime/ includes nothing of esokit, and
-# headers of esokit include it.
+# headers of esokit include it. Definitions (impl/*.ipp) go the same way as the headers of their folder; some
+# header includes each, and so does impl/esokit.cpp.
 # usage: cmake/check_include_direction.sh [INCLUDE_DIR | --self-test]
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -28,7 +29,7 @@ check() {  # check INCLUDE_DIR
       for (i = 1; i < ARGC; ++i) {
         known[ARGV[i]] = 1
         split(ARGV[i], part, "/")
-        if (ARGV[i] == "esokit/esokit.hpp" || part[2] in rank) continue
+        if (ARGV[i] ~ /^esokit\/(esokit.hpp|impl\/esokit.cpp)$/ || part[2] in rank) continue
         printf "%s: not in a known folder\n", ARGV[i]
         ++refused
       }
@@ -39,7 +40,7 @@ check() {  # check INCLUDE_DIR
     }
     FNR == 1 {
       split(FILENAME, part, "/")
-      umbrella = (FILENAME == "esokit/esokit.hpp")
+      umbrella = (FILENAME ~ /^esokit\/(esokit.hpp|impl\/esokit.cpp)$/)
       mine = (part[2] in rank) ? rank[part[2]] : 0
     }
     umbrella && /^#include <esokit\// { brought[$0] = 1 }
@@ -61,7 +62,7 @@ check() {  # check INCLUDE_DIR
       }
       split(target, part, "/")
       reaches[FILENAME] = 1
-      included[target] = 1
+      if (!umbrella) included[target] = 1
       if (!(target in known)) refuse("no such header")
       else if (umbrella) next
       else if (!(part[2] in rank)) refuse("a header may not include the umbrella header")
@@ -77,8 +78,9 @@ check() {  # check INCLUDE_DIR
           printf "%s: does not include esokit/core/language.hpp\n", ARGV[i]
           ++refused
         }
-        if (ARGV[i] == "esokit/esokit.hpp" || ("#include <" ARGV[i] ">") in brought) continue
-        printf "esokit/esokit.hpp: does not include %s\n", ARGV[i]
+        if (ARGV[i] ~ /\.ipp$/ && !(ARGV[i] in included)) { printf "%s: no header includes it\n", ARGV[i]; ++refused }
+        if (ARGV[i] ~ /^esokit\/(esokit.hpp|impl\/esokit.cpp)$/ || ("#include <" ARGV[i] ">") in brought) continue
+        printf "esokit/%s: does not include %s\n", ARGV[i] ~ /\.ipp$/ ? "impl/esokit.cpp" : "esokit.hpp", ARGV[i]
         ++refused
       }
       exit refused > 0
@@ -198,6 +200,21 @@ self_test() {  # the check must be able to fail
     return 1
   fi
   sed -i '$d' "$folder/esokit/target/runtime/a.c"
+  mkdir -p "$folder/esokit/impl" "$folder/esokit/sim/impl"
+  echo '#include <esokit/sim/c.hpp>' >"$folder/esokit/sim/impl/c.ipp"
+  echo '#include <esokit/sim/impl/c.ipp>' >"$folder/esokit/impl/esokit.cpp"
+  if check "$folder" >/dev/null; then
+    echo "self-test: definitions that no header includes are not refused"
+    return 1
+  fi
+  echo '#include <esokit/sim/impl/c.ipp>' >>"$folder/esokit/sim/c.hpp"
+  check "$folder" || { echo "self-test: definitions that their header includes are refused"; return 1; }
+  : >"$folder/esokit/impl/esokit.cpp"
+  if check "$folder" >/dev/null; then
+    echo "self-test: definitions that esokit.cpp lacks are not refused"
+    return 1
+  fi
+  echo '#include <esokit/sim/impl/c.ipp>' >"$folder/esokit/impl/esokit.cpp"
   touch "$folder/esokit/loose.hpp"
   if check "$folder" >/dev/null; then
     echo "self-test: a header outside the folders is not refused"

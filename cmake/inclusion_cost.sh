@@ -2,7 +2,8 @@
 # What a header costs to include: cmake/inclusion_cost.sh [HEADER...]
 # Least of three compiles of a file that only includes it (-fsyntax-only), and its preprocessed
 # lines, beside Eigen/Dense; without arguments the headers that users include. CXX chooses the
-# compiler, EIGEN the folder of Eigen.
+# compiler, EIGEN the folder of Eigen, CXXFLAGS more options (-DESOKIT_COMPILED: what is
+# declared alone, for those who link esokit::compiled).
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 compiler=${CXX:-c++}
@@ -21,7 +22,7 @@ fi
 
 measure() {  # milliseconds and preprocessed lines of including $1
   echo "#include <$1>" >"$work/main.cpp"
-  local -a command=("$compiler" -std=c++20 -Iinclude -isystem "$eigen" "$work/main.cpp")
+  local -a command=("$compiler" -std=c++20 ${CXXFLAGS:-} -Iinclude -isystem "$eigen" "$work/main.cpp")
   local best= started spent lines
   for _ in 1 2 3; do
     started=${EPOCHREALTIME/[.,]/}

@@ -227,7 +227,7 @@ def main():
     if sys.argv[1:] == ["--self-test"]:
         sys.exit(0 if self_test() else 1)
     files = [Path(name).resolve() for name in sys.argv[1:]] or [
-        file for pattern in ("*.md", "cmake/packaging/*.md", "benchmarks/*.md", "examples/**/*.md", "include/**/*.hpp")
+        file for pattern in ("*.md", "cmake/packaging/*.md", "benchmarks/*.md", "examples/**/*.md", "include/**/*.[hi]pp")
         for file in sorted(ROOT.glob(pattern)) if file.name != "CHANGELOG.md"]
     good, bad = judged([one for file in files for one in said_in(file)],
                        excuses_of(EXCUSED.read_text(encoding="utf-8")) if EXCUSED.exists() else [])

@@ -51,7 +51,15 @@ export PKG_CONFIG_PATH=$work/root/usr/share/pkgconfig
 [[ $(pkg-config --modversion esokit) == "$version" ]] || fail "pkg-config: version"
 read -r -a flags < <(pkg-config --cflags esokit)
 "${CXX:-c++}" -std=c++20 "${flags[@]}" "$work/main.cpp" -o "$work/by_pkg_config"
+read -r -a flags < <(pkg-config --cflags esokit-compiled)
+"${CXX:-c++}" -std=c++20 "${flags[@]}" -c "$(pkg-config --variable=source esokit-compiled)" -o "$work/esokit.o"
+"${CXX:-c++}" -std=c++20 "${flags[@]}" tests/consumer/workstation.cpp "$work/esokit.o" -o "$work/workstation"
+"$work/workstation"
 "$work/by_pkg_config"
+read -r -a flags < <(pkg-config --cflags esokit-compiled)
+"${CXX:-c++}" -std=c++20 "${flags[@]}" -c "$(pkg-config --variable=source esokit-compiled)" -o "$work/esokit.o"
+"${CXX:-c++}" -std=c++20 "${flags[@]}" tests/consumer/workstation.cpp "$work/esokit.o" -o "$work/workstation"
+"$work/workstation"
 
 # --- FetchContent, with the lines of README.md ---
 mkdir "$work/fetch"
@@ -67,8 +75,8 @@ cmake -S "$work/fetch" -B "$work/fetch/build" -G Ninja
 cmake --build "$work/fetch/build"
 "$work/fetch/build/my_controller"
 
-# --- one header ---
-mkdir "$work/single" "$work/release"
+# --- one header, or one and a source file ---
+mkdir -p "$work/single" "$work/release/split"
 cp "${deb[0]}" "$work/release"
 bash cmake/amalgamate.sh >"$work/release/esokit.hpp"
 bash cmake/amalgamate.sh observer adapter control >"$work/release/esokit_control.hpp"
@@ -90,6 +98,13 @@ by_headers() {
 by_headers control esokit_control.hpp
 by_headers everything esokit.hpp adrc.hpp
 by_headers several observers.hpp adrc.hpp esokit_control.hpp
+bash cmake/amalgamate.sh --split "$work/release/split"
+if grep -n '#include <esokit/' "$work"/release/split/*; then fail "the two files include esokit"; fi
+sed 's/#include <esokit.*/#include "esokit.hpp"/' tests/consumer/workstation.cpp >"$work/single/workstation.cpp"
+# shellcheck disable=SC2046
+"${CXX:-c++}" -std=c++20 -I"$work/release/split" $(pkg-config --cflags eigen3) \
+  "$work/single/workstation.cpp" "$work/release/split/esokit.cpp" -o "$work/single/workstation"
+"$work/single/workstation"
 
 # --- vcpkg port: run with stand-ins for vcpkg's functions, which do what theirs do here ---
 cat >"$work/port.cmake" <<END

@@ -55,6 +55,7 @@
 #include <esokit/control/telemetry.hpp>
 #include <esokit/control/tracking_differentiator.hpp>
 #include <esokit/core/check.hpp>
+#include <esokit/core/compiled.hpp>
 #include <esokit/core/declared.hpp>
 #include <esokit/core/error.hpp>
 #include <esokit/core/error_text.hpp>

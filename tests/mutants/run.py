@@ -338,7 +338,7 @@ class Place:
                 skip = not skip
             elif word.endswith(".hxx"):
                 command += [str(self.precompiled(word)), "-include", f"{self.folder}/switch.hpp"]
-            elif not re.match(r"-O|-g|-W|-MD", word):
+            elif not re.match(r"-O|-g|-W|-MD|-DESOKIT_COMPILED", word):  # with the definitions, to switch them
                 command.append(word.replace(f"{ROOT}/include", f"{self.folder}/include")
                                .replace(f"{ROOT}/tests", f"{self.folder}/tests"))
         if f"{self.folder}/switch.hpp" not in command:
@@ -510,7 +510,7 @@ def main():
 
     headers = {path: (ROOT / path).read_text(encoding="utf-8")
                for path in sorted(file.relative_to(ROOT).as_posix() for file in
-                                  ROOT.glob("include/esokit/*/*.hpp"))
+                                  ROOT.glob("include/esokit/**/*.[hi]pp"))
                if (not options.only or any(part in path for part in options.only))
                and not any(part in path for part in options.skip)}
     results = options.results or build / f"mutants_{options.seed}.json"

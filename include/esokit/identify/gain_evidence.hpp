@@ -2,16 +2,13 @@
 /// b0 by ranges of a scheduling column, and the interval that all evidence asks for.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-#include <cstddef>
+#include <esokit/core/compiled.hpp>
 #include <esokit/identify/fit.hpp>
 #include <esokit/identify/identified.hpp>
 #include <esokit/identify/intervals.hpp>
 #include <esokit/identify/order_fits.hpp>
 #include <esokit/identify/plateau.hpp>
 #include <esokit/identify/second_opinion.hpp>
-#include <limits>
 #include <vector>
 
 namespace esokit {
@@ -21,90 +18,8 @@ namespace detail {
 /// Computes b0 at the plateau for ranges of a scheduling column, and as a straight line over the
 /// column.
 /// @param used the data with friction and sines
-inline void find_schedule(const FitData& used, const std::vector<double>& along,
-                          const FitModel& model, const IdentifyOptions& options,
-                          Identified& result) {
-  const double t = student_95(19);
-  std::vector<double> sorted = along;
-  std::sort(sorted.begin(), sorted.end());
-  std::vector<double> edges;  // upper ends except the last; ranges with a single value are merged
-  for (int bin = 1; bin < options.schedule_bins; ++bin) {
-    const double edge = sorted[sorted.size() * static_cast<std::size_t>(bin) /
-                               static_cast<std::size_t>(options.schedule_bins)];
-    if (edge > sorted.front() && (edges.empty() || edge > edges.back())) edges.push_back(edge);
-  }
-  FitData parts = used;
-  parts.inputs.assign(edges.size(), std::vector<double>(along.size(), 0.0));
-  result.schedule.assign(edges.size() + 1, {});
-  for (GainInRange& range : result.schedule) {
-    range.from = std::numeric_limits<double>::infinity();
-    range.to = -range.from;
-  }
-  double mean = 0.0;
-  for (std::size_t k = 0; k < along.size(); ++k) {
-    const auto bin = static_cast<std::size_t>(
-        std::upper_bound(edges.begin(), edges.end(), along[k]) - edges.begin());
-    GainInRange& range = result.schedule[bin];
-    range.from = (std::min)(range.from, along[k]);
-    range.to = (std::max)(range.to, along[k]);
-    ++range.rows;
-    mean += along[k] / static_cast<double>(along.size());
-    if (bin > 0) {
-      parts.inputs[bin - 1][k] = used.u[k];
-      parts.u[k] = 0.0;
-    }
-  }
-  const FitBounds& bounds =
-      std::find_if(result.orders.begin(), result.orders.end(), [&](const auto& order) {
-        return order.model.order == result.order;
-      })->bounds;
-  const Plateau& plateau = result.plateau;
-  // At the plateau and its neighbours, like b0 itself.
-  const auto solved = [&](const FitData& data, std::vector<double>& value,
-                          std::vector<double>& error) {
-    InnovationsFit fit(data, model, bounds);
-    std::vector<double> low, high;
-    for (const std::size_t i : {plateau.middle - 1, plateau.middle + 1, plateau.middle}) {
-      const Fit found = fit.at(plateau.points[i].fit.at);
-      if (low.empty()) low = high = found.linear;
-      for (std::size_t c = 0; c < low.size(); ++c) {
-        low[c] = (std::min)(low[c], found.linear[c]);
-        high[c] = (std::max)(high[c], found.linear[c]);
-      }
-      if (i == plateau.middle) {
-        value = found.linear;
-        error = jackknife(fit, found, false).linear;
-      }
-    }
-    for (std::size_t c = 0; c < error.size(); ++c) error[c] += 0.25 * (high[c] - low[c]) / t;
-  };
-  std::vector<double> value, error;
-  solved(parts, value, error);
-  double weights = 0.0, middle = 0.0, square = 0.0, most = 0.0;
-  for (std::size_t bin = 0; bin < result.schedule.size(); ++bin) {
-    result.schedule[bin].input_gain = {value[bin], t * error[bin]};
-    const double weight = 1.0 / (error[bin] * error[bin]);
-    weights += weight;
-    middle += weight * value[bin];
-  }
-  middle /= weights;
-  // One of several ranges may differ by chance: all together must differ by more than chance, and
-  // one by more than its interval.
-  for (std::size_t bin = 0; bin < result.schedule.size(); ++bin) {
-    const double off = (std::abs)(value[bin] - middle) / error[bin];
-    square += off * off;
-    most = (std::max)(most, off / t);
-  }
-  const double freedom = static_cast<double>(result.schedule.size()) - 1.0;
-  const double cube = 1.0 - 2.0 / (9.0 * freedom) + 1.645 * std::sqrt(2.0 / (9.0 * freedom));
-  result.schedule_shift =
-      freedom > 0.0 ? (std::min)(most, std::sqrt(square / (freedom * cube * cube * cube))) : 0.0;
-  FitData line = used;
-  line.inputs.assign(1, std::vector<double>(along.size()));
-  for (std::size_t k = 0; k < along.size(); ++k) line.inputs[0][k] = used.u[k] * (along[k] - mean);
-  solved(line, value, error);
-  result.schedule_slope = {value[1], t * error[1]};
-}
+void find_schedule(const FitData& used, const std::vector<double>& along, const FitModel& model,
+                   const IdentifyOptions& options, Identified& result);
 
 /// Smallest share of u that does not follow from y.
 constexpr double own_input_min = 1e-5;
@@ -114,69 +29,33 @@ constexpr double excitation_max = 0.15;
 
 /// Whether the innovations are as white as those of an exact model: of few rows the largest of
 /// twenty correlations is larger.
-inline double correlation_limit(const Identified& found, const IdentifyOptions& options) {
-  const double rows = static_cast<double>(found.log.used) / found.averaged;
-  return (std::max)(options.correlation_max, 3.0 / std::sqrt(rows));
-}
-inline bool white(const Identified& found, const IdentifyOptions& options) {
-  return found.correlation <= correlation_limit(found, options);
-}
+double correlation_limit(const Identified& found, const IdentifyOptions& options);
+
+bool white(const Identified& found, const IdentifyOptions& options);
 
 /// Half a row, s: what takes less is not seen.
-inline double half_row(const Identified& found) {
-  return 0.5 * found.averaged * found.log.sample_time;
-}
+double half_row(const Identified& found);
 
 /// Whether output error tells b0. Where y follows u within half a row, no machine was seen between
 /// them (y may have been logged before u, or b0 is lost in the noise): then it confirms nothing but
 /// what nearly all of y says of a position, which u has to move for many rows.
-inline bool informed(const Identified& found) {
-  const SecondOpinion& second = found.second_opinion;
-  if (!second.informative()) return false;
-  return found.latency.value >= half_row(found) ||
-         (found.order >= 2 && second.explained >= 0.95 && !(found.lead.time > 0.0) &&
-          (std::abs)(second.input_gain.value / found.input_gain.value - 1.0) <= 0.1);
-}
+bool informed(const Identified& found);
 
 /// Half width that b0 of a plateau within two octaves of the lowest bandwidth needs. There every
 /// fit is one of output error, so that neighbours agree tells nothing: b0 has to reach to the
 /// interval of that of up to four octaves above, where the log is far more likely: by more than
 /// e^10.
-inline double reach_above(const Plateau& plateau, double bandwidth_min) {
-  const Fit& here = plateau.points[plateau.middle].fit;
-  double reach = 0.0;
-  if (here.at.bandwidth > 4.0 * bandwidth_min) return reach;
-  const std::size_t high = (std::min)(plateau.middle + 8, plateau.points.size() - 1);
-  for (std::size_t i = plateau.middle + 1; i <= high; ++i) {
-    const PlateauPoint& point = plateau.points[i];
-    const double gained = 0.5 * static_cast<double>(point.fit.rows) *
-                          std::log(here.mean_square / point.fit.mean_square);
-    if (point.at_bound || !(gained > 10.0)) continue;
-    const double apart = (std::abs)(point.fit.linear[0] - here.linear[0]);
-    reach = (std::max)(reach, apart - student_95(19) * point.errors.linear[0]);
-  }
-  return reach;
-}
+double reach_above(const Plateau& plateau, double bandwidth_min);
 
 /// b0 with the interval that the other evidence asks for. Coloured innovations mean that the model
 /// is not exact, so b0 is not known better than to a per cent. Where output error may be right
 /// instead, the interval spans both. Friction that holds the machine takes b0 down, and that of the
 /// motion is nearer to the truth: the interval reaches to the end of its own.
-inline Estimate widened(const Identified& found, const IdentifyOptions& options) {
-  Estimate gain = found.input_gain;
-  const auto reach = [&](double to) {
-    gain.half_width = (std::max)(gain.half_width, (std::abs)(to - gain.value));
-  };
-  const bool coloured = !white(found, options);
-  if (coloured) gain.half_width += 0.01 * (std::abs)(gain.value);
-  // When exactly the machine stands is not known, and that moves b0 by some per cent.
-  if (found.held > 0.0) gain.half_width += 0.1 * (std::abs)(gain.value);
-  if (informed(found) && (coloured || gain.share() > options.interval_max))
-    reach(found.second_opinion.input_gain.value);
-  const Estimate& moving = found.in_motion.moving;
-  if (found.in_motion.differ()) reach(moving.value > gain.value ? moving.high() : moving.low());
-  return gain;
-}
+Estimate widened(const Identified& found, const IdentifyOptions& options);
 
 }  // namespace detail
 }  // namespace esokit
+
+#if defined(ESOKIT_HEADER_ONLY)
+#include <esokit/identify/impl/gain_evidence.ipp>
+#endif

@@ -2,11 +2,11 @@
 /// Identified: a model with error bars and the evidence for it; the options of an identification.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
 #include <esokit/core/check.hpp>
+#include <esokit/core/compiled.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/identify/fit.hpp>
 #include <esokit/identify/input_checks.hpp>
@@ -89,15 +89,9 @@ struct PositionForce {
                                       ///< y^(n)
 
   /// Unit of y^(n), as it acts; beyond the range of the log it stays as at its end.
-  [[nodiscard]] double operator()(double y) const {
-    const double x = (std::clamp(y, low, high) - middle) / size;
-    return x * (factors[0].value + x * (factors[1].value + x * factors[2].value));
-  }
+  [[nodiscard]] double operator()(double y) const;
   /// A bound on its error, 95 %, as if all factors were wrong together.
-  [[nodiscard]] double half_width(double y) const {
-    const double x = (std::abs)((std::clamp(y, low, high) - middle) / size);
-    return x * (factors[0].half_width + x * (factors[1].half_width + x * factors[2].half_width));
-  }
+  [[nodiscard]] double half_width(double y) const;
 };
 
 /// Another order at the bandwidth at which b0 was found.
@@ -238,13 +232,14 @@ struct Identified {
   }
 
  private:
-  [[nodiscard]] double bandwidth_of(double intensity) const {
-    return std::pow(intensity / (noise.value * noise.value * log.sample_time),
-                    0.5 / (order + extension));
-  }
+  [[nodiscard]] double bandwidth_of(double intensity) const;
   [[nodiscard]] double walk_of(double intensity) const {
     return intensity / std::pow(bandwidth_of(intensity), 2 * (extension - 1));
   }
 };
 
 }  // namespace esokit
+
+#if defined(ESOKIT_HEADER_ONLY)
+#include <esokit/identify/impl/identified.ipp>
+#endif

@@ -7,12 +7,9 @@
 /// whatever its cause, widens the interval.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-#include <cstddef>
+#include <esokit/core/compiled.hpp>
 #include <esokit/core/scalar.hpp>
 #include <esokit/identify/fit.hpp>
-#include <numbers>
 #include <utility>
 #include <vector>
 
@@ -46,12 +43,7 @@ struct FitErrors {
 
 /// Student's t for a two-sided 95 % interval (Cornish-Fisher expansion from the normal). @param
 /// freedom degrees of freedom
-[[nodiscard]] inline double student_95(int freedom) {
-  const double z = 1.959963985;
-  const double n = freedom;
-  return z + (z * z * z + z) / (4.0 * n) +
-         (5.0 * std::pow(z, 5) + 16.0 * z * z * z + 3.0 * z) / (96.0 * n * n);
-}
+[[nodiscard]] double student_95(int freedom);
 
 /// Standard errors of lag and dead time: the largest distance from the fit within the ellipse of
 /// latency and squared lag of which `t` standard errors are the 95 % interval, divided by `t`.
@@ -59,131 +51,17 @@ struct FitErrors {
 /// The log determines latency and squared lag: in these the ellipse is right, also where the lag is
 /// at zero, the end of its range, and has no standard error of its own.
 /// @param longest the lag is below it, s, where this is not the latency
-[[nodiscard]] inline std::pair<double, double> split_errors(const FitPoint& at,
-                                                            const SplitCovariance& covariance,
-                                                            double t, double longest = 0.0) {
-  // The squared lag is between zero and the squared latency, so a larger error says nothing more.
-  longest = (std::max)(longest, at.latency);
-  const double square = (std::min)(longest * longest, t * std::sqrt(covariance.lag_square));
-  const double along = t * std::sqrt(covariance.latency);
-  const double correlation =
-      covariance.both / std::sqrt(covariance.latency * covariance.lag_square);
-  const double shared = is_finite(correlation) ? std::clamp(correlation, -1.0, 1.0) : 0.0;
-  const double alone = std::sqrt(1.0 - shared * shared);
-  double lag = 0.0, dead_time = 0.0;
-  constexpr int directions = 64;
-  for (int i = 0; i < directions; ++i) {
-    const double angle = 2.0 * std::numbers::pi * i / directions;
-    const double latency =
-        (std::max)(at.latency + along * (shared * std::cos(angle) + alone * std::sin(angle)), 0.0);
-    const double tau = (std::min)(
-        std::sqrt((std::max)(at.lag() * at.lag() + square * std::cos(angle), 0.0)), latency);
-    lag = (std::max)(lag, (std::abs)(tau - at.lag()));
-    dead_time = (std::max)(dead_time, (std::abs)(latency - tau - at.dead_time()));
-  }
-  return {lag / t, dead_time / t};
-}
+[[nodiscard]] std::pair<double, double> split_errors(const FitPoint& at,
+                                                     const SplitCovariance& covariance, double t,
+                                                     double longest = 0.0);
 
 /// Standard errors of the fit that `fit` returned last, by leaving out one of `stretches` equal
 /// stretches at a time.
-[[nodiscard]] inline FitErrors jackknife(InnovationsFit& fit, const Fit& at, bool with_bandwidth,
-                                         int stretches = 20) {
-  const auto sensitivities = fit.sensitivities(at, with_bandwidth, true);
-  const auto& jacobian = sensitivities.columns;
-  const auto& residual = fit.residual();
-  const std::size_t count = jacobian.size();
-  const std::size_t free = sensitivities.free.size();
-  const std::size_t rows = residual.size();
-  std::vector<std::vector<double>> normals(static_cast<std::size_t>(stretches));
-  std::vector<std::vector<double>> rights(static_cast<std::size_t>(stretches));
-  std::vector<double> squares(static_cast<std::size_t>(stretches));
-  std::vector<double> normal(count * count, 0.0), right(count, 0.0);
-  double square = 0.0;
-  for (std::size_t s = 0; s < normals.size(); ++s) {
-    const std::size_t from = rows * s / normals.size(), to = rows * (s + 1) / normals.size();
-    InnovationsFit::normal_equations(jacobian, residual, normals[s], rights[s], from, to);
-    for (std::size_t k = from; k < to; ++k) squares[s] += residual[k] * residual[k];
-    for (std::size_t i = 0; i < normal.size(); ++i) normal[i] += normals[s][i];
-    for (std::size_t i = 0; i < right.size(); ++i) right[i] += rights[s][i];
-    square += squares[s];
-  }
-  // The results without each stretch: w, latency, squared lag, pole, noise, linear, times.
-  const std::size_t linear = free + at.linear.size();  // behind them
-  const std::size_t quantities = 5 + count - free;
-  const auto& timed = fit.data().timed;
-  const auto each_time = [&](const auto& use) {
-    std::size_t next = linear;
-    for (const TimedColumn& column : timed) {
-      if (column.free) use(column, next), next += 2;
-    }
-  };
-  std::vector<std::vector<double>> values;
-  for (std::size_t s = 0; s < normals.size(); ++s) {
-    std::vector<double> without = normal, step = right;
-    for (std::size_t i = 0; i < without.size(); ++i) without[i] -= normals[s][i];
-    for (std::size_t i = 0; i < step.size(); ++i) step[i] -= rights[s][i];
-    detail::solve_normal(without, step, static_cast<int>(count));
-    double log_w = 0.0, log_latency = 0.0;
-    double share_square = at.at.lag_share * at.at.lag_share;
-    double product = at.at.pole * at.at.latency;
-    for (std::size_t i = 0; i < free; ++i) {
-      const double by = std::clamp(-step[i], -0.7, 0.7);
-      switch (sensitivities.free[i]) {
-        case 0:
-          log_w = by;
-          break;
-        case 1:
-          log_latency = by;
-          break;
-        case 2:
-          // Not limited: at a limit all stretches would agree.
-          share_square -= step[i];
-          break;
-        default:
-          product += by;
-      }
-    }
-    const double latency = at.at.latency * std::exp(log_latency);
-    std::vector<double> value = {
-        at.at.bandwidth * std::exp(log_w), latency, latency * latency * share_square,
-        product / latency,
-        at.noise * std::sqrt((1.0 - squares[s] / square) * static_cast<double>(stretches) /
-                             static_cast<double>(stretches - 1))};
-    for (std::size_t i = 0; i < at.linear.size(); ++i)
-      value.push_back(at.linear[i] - step[free + i]);
-    each_time([&](const TimedColumn& column, std::size_t i) {
-      value.push_back(column.latency - step[i]);
-      value.push_back(column.lag_square - step[i + 1]);
-    });
-    values.push_back(std::move(value));
-  }
-  const double n = static_cast<double>(stretches);
-  std::vector<double> means(quantities);
-  for (const auto& value : values) {
-    for (std::size_t q = 0; q < quantities; ++q) means[q] += value[q] / n;
-  }
-  const auto covariance = [&](std::size_t p, std::size_t q) {
-    double sum = 0.0;
-    for (const auto& value : values) sum += (value[p] - means[p]) * (value[q] - means[q]);
-    return sum * (n - 1.0) / n;
-  };
-  const auto error = [&](std::size_t q) { return std::sqrt(covariance(q, q)); };
-  const auto [lag, dead_time] = split_errors(
-      at.at, {covariance(1, 1), covariance(2, 2), covariance(1, 2)}, student_95(stretches - 1));
-  FitErrors errors{error(0), error(1), lag, dead_time, error(3), error(4), {}, {}};
-  for (std::size_t q = 5; q < 5 + at.linear.size(); ++q) errors.linear.push_back(error(q));
-  errors.times.resize(timed.size());
-  if (linear == count) return errors;
-  detail::solve_normal(normal, right, static_cast<int>(count));
-  each_time([&](const TimedColumn& column, std::size_t i) {
-    const std::size_t q = 5 + i - free;
-    FitErrors::Times& found = errors.times[static_cast<std::size_t>(&column - timed.data())];
-    found.latency = (std::max)(column.latency - right[i], 0.0);
-    found.lag =
-        (std::min)(std::sqrt((std::max)(column.lag_square - right[i + 1], 0.0)), found.latency);
-    found.covariance = {covariance(q, q), covariance(q + 1, q + 1), covariance(q, q + 1)};
-  });
-  return errors;
-}
+[[nodiscard]] FitErrors jackknife(InnovationsFit& fit, const Fit& at, bool with_bandwidth,
+                                  int stretches = 20);
 
 }  // namespace esokit
+
+#if defined(ESOKIT_HEADER_ONLY)
+#include <esokit/identify/impl/intervals.ipp>
+#endif
