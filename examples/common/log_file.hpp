@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <cstddef>
@@ -255,10 +256,12 @@ class TextLines {
 
 /// The wanted columns of a CSV file. Lines that begin with # or % or // are comments. The numbers
 /// begin where a line looks like those further down; up to three lines directly above it name the
-/// columns (names, units), or the last comment, or a label before each number (u:1.5). Columns are
-/// named by them, by what follows the last / or . of a name or by its beginning where that is one
-/// column's alone, or by their number from 1. Where the separator is no comma, a comma in a number
-/// is a decimal one. What may be read in two ways is refused.
+/// columns (names, units), or the last comment, or a label before each number (u:1.5, "u: 1.5 V",
+/// u=1.5; other lines between them are left out). Columns are named by them, by what follows the
+/// last / or . of a name or by its beginning where that is one column's alone, or by their number
+/// from 1 (@2: where a name is a number, too). Where the separator is no comma, a comma in a number
+/// is a decimal one. A number may have a unit behind it, ON and true are 1. What may be read in two
+/// ways is refused.
 class LogFile {
  public:
   /// Reads the header and the first row alone.
@@ -294,17 +297,29 @@ class LogFile {
   }
   /// "FILE, line 17: " of a row.
   [[nodiscard]] std::string where(std::size_t row) const { return at(lines_[row]); }
+  /// Where a wanted column is, from 1.
+  [[nodiscard]] std::size_t place(std::size_t i) const { return places_[i].column + 1; }
+  /// What stands behind the numbers of a wanted column: its unit.
+  [[nodiscard]] const std::string& cell_unit(std::size_t i) const { return cells_[i].unit; }
+  /// How many fields of a wanted column are words: ON, true, ERR.
+  [[nodiscard]] std::size_t switched(std::size_t i) const { return cells_[i].switched; }
+  [[nodiscard]] std::size_t failed(std::size_t i) const { return cells_[i].failed; }
+  /// Lines without the labels of the others, which were left out.
+  [[nodiscard]] std::size_t other_lines() const { return other_lines_; }
   /// Whether the last line was cut in the middle and left out.
   [[nodiscard]] bool cut() const { return cut_; }
   /// The stamps: whether they are numbers, and the first.
   [[nodiscard]] const StampReader& stamps() const { return reader_; }
-  /// All names, in words.
+  /// The names, in words, of many columns the first.
   [[nodiscard]] std::string there() const {
     if (headers_.empty()) return "numbers 1 to " + std::to_string(count_);
+    constexpr std::size_t most = 16;
     std::string text;
     for (const auto& names : headers_) {
       if (!text.empty()) text += "; also called ";
-      for (std::size_t i = 0; i < names.size(); ++i) text += (i == 0 ? "" : ", ") + names[i];
+      for (std::size_t i = 0; i < std::min(names.size(), most); ++i)
+        text += (i == 0 ? "" : ", ") + names[i];
+      if (names.size() > most) text += " and " + std::to_string(names.size() - most) + " more";
     }
     return text;
   }
@@ -358,11 +373,17 @@ class LogFile {
     const std::size_t begin = understand(heads);
     if (header_only) return;
     for (const std::string& name : wanted) places_.push_back(find_column(name));
+    cells_.resize(wanted.size());
     std::size_t shown = 0;
     Fields fields;
     const auto take = [&](const Head& head) {
       if (head.comment) return;
       split(head.text, separator_, fields);
+      if (!labels_.empty() && std::all_of(fields.begin(), fields.end(),
+                                          [](std::string_view field) { return field.empty(); })) {
+        ++other_lines_;
+        return;
+      }
       if (!head.whole && fields.size() < count_) {
         cut_ = true;
         return;
@@ -392,6 +413,9 @@ class LogFile {
     if (text.empty()) throw LogError(file_.path() + ": no line with numbers");
     // The last third is numbers: no header is so long.
     const std::size_t body = text.size() - std::max<std::size_t>(1, text.size() / 3);
+    if (separator_ == 0 || separator_ == ' ') {
+      if (const auto begin = understand_labels(heads, text, body)) return *begin;
+    }
     if (separator_ == 0) {
       int most = std::numeric_limits<int>::min();
       for (const char c : {';', '\t', '|', ',', ' '}) {
@@ -457,6 +481,104 @@ class LogFile {
     return begin;
   }
 
+  /// A label and what stands behind its colon or equals sign.
+  struct Labelled {
+    std::string_view label, value;
+    bool apart = false;  ///< with a blank or an equals sign between them
+  };
+  /// The labels of a line: "sec: 0.29  out=64.00", {"t": 1}; before the first one a stamp or a
+  /// number has none.
+  static void labels_of(std::string_view line, std::vector<Labelled>& all) {
+    constexpr std::string_view ends = " \t,;|{}[]\"'";
+    all.clear();
+    if (const auto arrow = line.find(" -> "); arrow != std::string_view::npos) {
+      if (const auto stamp = trimmed(line.substr(0, arrow)); parse_stamp(stamp)) {
+        all.push_back({{}, stamp, false});
+        line.remove_prefix(arrow + 4);
+      }
+    }
+    const auto in_number = [&](std::size_t i) {
+      const auto digit = [&](std::size_t at) {
+        return at < line.size() && line[at] >= '0' && line[at] <= '9';
+      };
+      return line[i] == ',' && i > 0 && digit(i - 1) && digit(i + 1);
+    };
+    for (std::size_t from = 0, i = 0; i < line.size(); ++i) {
+      if (line[i] != ':' && line[i] != '=') continue;
+      std::size_t end = i;
+      while (end > from && (line[end - 1] == ' ' || line[end - 1] == '"' || line[end - 1] == '\''))
+        --end;
+      std::size_t begin = end;
+      while (begin > from && ends.find(line[begin - 1]) == std::string_view::npos) --begin;
+      const auto first = static_cast<unsigned char>(begin < end ? line[begin] : ' ');
+      if (!(first > 127 || std::isalpha(first) != 0 || first == '_')) continue;
+      if (all.empty() && begin > 0) {
+        const std::string_view before = trimmed(line.substr(0, begin));
+        const std::string_view word = before.substr(0, before.find_first_of(ends));
+        if (!word.empty() && is_number(word, ' ')) all.push_back({{}, word, false});
+      }
+      std::size_t value = i + 1;
+      while (value < line.size() &&
+             (line[value] == ' ' || line[value] == '\t' || line[value] == '"'))
+        ++value;
+      from = value;
+      while (from < line.size() &&
+             (ends.find(line[from]) == std::string_view::npos || in_number(from)))
+        ++from;
+      all.push_back({line.substr(begin, end - begin), line.substr(value, from - value),
+                     line[i] == '=' || value > i + 1});
+      i = from > i ? from - 1 : i;
+    }
+  }
+
+  /// Lines of labels with blanks or equals signs, of which at least two have numbers.
+  /// @return the first such line
+  std::optional<std::size_t> understand_labels(const std::vector<Head>& heads,
+                                               const std::vector<std::size_t>& text,
+                                               std::size_t body) {
+    std::vector<Labelled> found;
+    std::vector<std::string> names;
+    std::vector<std::size_t> seen, numbers;
+    std::size_t apart = 0;
+    for (std::size_t i = body; i < text.size(); ++i) {
+      labels_of(heads[text[i]].text, found);
+      for (const Labelled& one : found) {
+        const auto at = static_cast<std::size_t>(std::find(names.begin(), names.end(), one.label) -
+                                                 names.begin());
+        if (at == names.size())
+          names.emplace_back(one.label), seen.push_back(0), numbers.push_back(0);
+        ++seen[at];
+        numbers[at] += is_value(one.value, ' ') ? 1U : 0U;
+        apart += one.apart ? 1U : 0U;
+      }
+    }
+    const std::size_t lines = text.size() - body;
+    std::size_t columns = 0;
+    for (std::size_t c = 0; c < names.size(); ++c) {
+      if (3 * seen[c] < 2 * lines || seen[c] > lines) continue;
+      labels_.push_back(names[c]);
+      columns += 2 * numbers[c] > seen[c] ? 1U : 0U;
+    }
+    if (columns < 2 || apart < lines) {
+      labels_.clear();
+      return std::nullopt;
+    }
+    separator_ = ' ';
+    headers_.assign(1, labels_);
+    for (auto& name : headers_[0]) {
+      if (name.empty()) name = "time";
+    }
+    count_ = labels_.size();
+    Fields fields;
+    for (const std::size_t i : text) {
+      split(heads[i].text, separator_, fields);
+      if (std::none_of(fields.begin(), fields.end(),
+                       [](std::string_view field) { return field.empty(); }))
+        return header_line_ = heads[i].number, i;
+    }
+    return text[body];
+  }
+
   /// Of the lines that are numbers: how many fields, and which are numbers.
   struct Shape {
     std::size_t count = 0;
@@ -477,7 +599,7 @@ class LogFile {
       for (std::size_t c = 0; c < fields.size(); ++c) {
         if (fields[c].empty()) continue;
         ++filled[c];
-        if (is_number(fields[c], separator)) ++numbers[c];
+        if (is_value(fields[c], separator)) ++numbers[c];
       }
     }
     Shape shape;
@@ -494,18 +616,20 @@ class LogFile {
   enum class Numbers { none, some, all };
   /// Of the fields that are to be numbers.
   [[nodiscard]] Numbers numbers_in(const Shape& shape, const Fields& fields) const {
-    std::size_t are = 0, filled = 0;
+    std::size_t are = 0, values = 0, filled = 0;
     for (std::size_t c = 0; c < std::min(fields.size(), shape.number.size()); ++c) {
       if (!shape.number[c] || fields[c].empty()) continue;
       ++filled;
-      if (is_number(fields[c], separator_)) ++are;
+      if (is_number(fields[c], separator_) || !unit_behind(fields[c]).empty()) ++are;
+      if (is_value(fields[c], separator_)) ++values;
     }
-    return are == 0 ? Numbers::none : are < filled ? Numbers::some : Numbers::all;
+    // A name may be "on", too.
+    return are == 0 ? Numbers::none : values < filled ? Numbers::some : Numbers::all;
   }
 
   [[noreturn]] void refuse_row(std::size_t line, const Shape& shape, const Fields& fields) const {
     for (std::size_t c = 0; c < std::min(fields.size(), shape.number.size()); ++c) {
-      if (shape.number[c] && !fields[c].empty() && !is_number(fields[c], separator_)) {
+      if (shape.number[c] && !fields[c].empty() && !is_value(fields[c], separator_)) {
         throw LogError(at(line) + "'" + std::string(fields[c]) + "' in column " +
                        std::to_string(c + 1) + " is not a number");
       }
@@ -549,8 +673,18 @@ class LogFile {
     return colon == std::string_view::npos ? std::string_view{} : field.substr(0, colon);
   }
 
-  static void split(std::string_view line, char separator, Fields& fields) {
+  void split(std::string_view line, char separator, Fields& fields) const {
     fields.clear();
+    if (!labels_.empty()) {
+      std::vector<Labelled> found;
+      labels_of(line, found);
+      for (const std::string& label : labels_) {
+        const auto at = std::find_if(found.begin(), found.end(),
+                                     [&](const Labelled& one) { return one.label == label; });
+        fields.push_back(at == found.end() ? std::string_view{} : at->value);
+      }
+      return;
+    }
     // The Arduino IDE writes "12:00:00.010 -> " before what it received.
     if (const auto arrow = line.find(" -> "); arrow != std::string_view::npos) {
       if (const auto stamp = trimmed(line.substr(0, arrow)); parse_stamp(stamp)) {
@@ -590,12 +724,19 @@ class LogFile {
     }
     if (text.front() == '+') text.remove_prefix(1);
     std::array<char, 64> point{};
-    if (const auto comma = text.find(',');
-        separator != ',' && comma != std::string_view::npos && text.size() < point.size()) {
+    const auto comma = separator != ',' ? text.find(',') : std::string_view::npos;
+    const auto exponent = text.find_first_of("dD");  // of Fortran: 1.5D-03
+    if ((comma != std::string_view::npos || exponent != std::string_view::npos) &&
+        text.size() < point.size()) {
       // A separator of thousands, or of columns.
-      if (comma + 1 == text.size() || text.find('.') != std::string_view::npos) return std::nullopt;
+      if (comma != std::string_view::npos &&
+          (comma + 1 == text.size() || text.find('.') != std::string_view::npos))
+        return std::nullopt;
+      if (exponent != std::string_view::npos && (exponent == 0 || exponent + 1 == text.size()))
+        return std::nullopt;
       std::copy(text.begin(), text.end(), point.begin());
-      point[comma] = '.';
+      if (comma != std::string_view::npos) point[comma] = '.';
+      if (exponent != std::string_view::npos) point[exponent] = 'e';
       text = {point.data(), text.size()};
     }
     Number number = 0;
@@ -608,6 +749,62 @@ class LogFile {
     return number;
   }
 
+  /// Words that stand for a number: 1, 0, or NaN where a sensor failed.
+  [[nodiscard]] static std::optional<double> word_value(std::string_view field) {
+    if (field.empty() || field.size() > 8) return std::nullopt;
+    std::string text(field);
+    for (char& c : text) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c;
+    for (const std::string_view one : {"on", "true", "ein", "yes"}) {
+      if (text == one) return 1.0;
+    }
+    for (const std::string_view zero : {"off", "false", "aus", "no"}) {
+      if (text == zero) return 0.0;
+    }
+    for (const std::string_view lost :
+         {"err", "error", "fail", "failed", "fault", "bad", "invalid", "ovf", "ol", "-", "--",
+          "---", "?", "#value!", "#ref!", "#div/0!", "#num!", "missing"}) {
+      if (text == lost) return std::numeric_limits<double>::quiet_NaN();
+    }
+    return std::nullopt;
+  }
+
+  /// How long the number is that a text begins with.
+  [[nodiscard]] static std::size_t number_length(std::string_view text) {
+    std::size_t i = 0, digits = 0;
+    const auto run = [&] {
+      for (; i < text.size() && text[i] >= '0' && text[i] <= '9'; ++i) ++digits;
+    };
+    if (i < text.size() && (text[i] == '-' || text[i] == '+')) ++i;
+    run();
+    if (i + 1 < text.size() && (text[i] == '.' || text[i] == ',') && text[i + 1] >= '0' &&
+        text[i + 1] <= '9')
+      ++i, run();
+    if (digits == 0) return 0;
+    if (i + 1 < text.size() && (text[i] == 'e' || text[i] == 'E')) {
+      const std::size_t before = i, had = digits;
+      i += text[i + 1] == '-' || text[i + 1] == '+' ? 2U : 1U;
+      run();
+      if (digits == had) i = before;
+    }
+    return i;
+  }
+  /// The unit behind a number: 23.5 °C, 12%, 0.3 m/s.
+  [[nodiscard]] static std::string_view unit_behind(std::string_view field) {
+    const std::size_t length = number_length(field);
+    if (length == 0 || length == field.size()) return {};
+    const std::string_view unit = trimmed(field.substr(length));
+    const auto first = static_cast<unsigned char>(unit.empty() ? '0' : unit.front());
+    if (!(first > 127 || std::isalpha(first) != 0 || first == '%') || unit.size() > 10 ||
+        unit.find_first_of(" \t:;,|0123456789-+") != std::string_view::npos)
+      return {};
+    return unit;
+  }
+
+  /// Whether a field of a column of numbers may say so.
+  static bool is_value(std::string_view field, char separator) {
+    return is_number(field, separator) || word_value(field).has_value() ||
+           !unit_behind(field).empty();
+  }
   static bool is_number(std::string_view field, char separator) {
     if (const auto label = label_of(field); !label.empty()) field.remove_prefix(label.size() + 1);
     return parse(field, separator).has_value() || parse_stamp(field).has_value();
@@ -636,6 +833,25 @@ class LogFile {
   }
 
   [[nodiscard]] Place find_column(const std::string& name) const {
+    const auto numbered = [&](std::string_view digits) -> std::size_t {
+      std::size_t number = 0;
+      const auto [end, error] =
+          std::from_chars(digits.data(), digits.data() + digits.size(), number);
+      const bool whole = error == std::errc{} && end == digits.data() + digits.size();
+      return whole && number <= count_ ? number : 0;
+    };
+    const std::size_t number = numbered(name);
+    if (name.starts_with('@')) {
+      if (const std::size_t at = numbered(std::string_view(name).substr(1)); at > 0)
+        return {at - 1, 0};
+    }
+    if (const auto named = only(name, [&](const std::string& full) { return full == name; });
+        named && number > 0 && named->column != number - 1) {
+      throw LogError(file_.path() + ": '" + name + "' is the name of column " +
+                     std::to_string(named->column + 1) + " and the number of column " + name +
+                     ": write @" + std::to_string(named->column + 1) + " or @" + name +
+                     ", which are numbers");
+    }
     if (const auto exact = only(name, [&](const std::string& full) { return full == name; }))
       return *exact;
     const auto ends = only(name, [&](const std::string& full) {
@@ -644,10 +860,7 @@ class LogFile {
       return before == '/' || before == '.';
     });
     if (ends) return *ends;
-    std::size_t number = 0;
-    const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), number);
-    if (error == std::errc{} && end == name.data() + name.size() && number >= 1 && number <= count_)
-      return {number - 1, 0};
+    if (number > 0) return {number - 1, 0};
     const auto begins = only(
         name, [&](const std::string& full) { return !name.empty() && full.starts_with(name); });
     if (begins) return *begins;
@@ -673,12 +886,24 @@ class LogFile {
         wrong = "does not have the label of the first row";
       if (!label.empty()) field.remove_prefix(label.size() + 1);
     }
+    Cells& cells = cells_[wanted];
+    if (const auto unit = unit_behind(field); !unit.empty() && !parse_stamp(field)) {
+      if (cells.unit.empty() && cells.numbers == 0) cells.unit = unit;
+      if (cells.unit != unit) {
+        throw LogError(at(line) + "'" + std::string(field) + "' in column " + column() +
+                       " has the unit " + std::string(unit) + ", the numbers before have " +
+                       (cells.unit.empty() ? "none" : cells.unit) +
+                       ": write all of them in one unit");
+      }
+      field = trimmed(field.substr(0, number_length(field)));
+    }
     double found = 0;
     if (stamps_ == wanted) {
       std::optional<long double> number = parse(field, separator_);
       // More digits than a double has are those of nanoseconds since 1970.
       if (number && field.size() > 15) number = parse<long double>(field, separator_);
       if (number) {
+        ++cells.numbers;
         found =
             std::isfinite(*number) ? reader_.number(*number, wrong) : static_cast<double>(*number);
       } else if (const auto stamp = parse_stamp(field)) {
@@ -688,6 +913,10 @@ class LogFile {
       }
     } else if (const auto number = parse(field, separator_)) {
       found = *number;
+      if (!field.empty()) ++cells.numbers;
+    } else if (const auto stands_for = word_value(field)) {
+      found = *stands_for;
+      ++(std::isfinite(found) ? cells.switched : cells.failed);
     } else {
       wrong = "is not a number";
     }
@@ -712,13 +941,21 @@ class LogFile {
                    (comma ? "point" : "comma"));
   }
 
+  /// What the fields of a column are beside numbers.
+  struct Cells {
+    std::string unit;
+    std::size_t numbers = 0, switched = 0, failed = 0;
+  };
+
   LogSource file_;
   char separator_;
   std::optional<std::size_t> stamps_;
-  std::size_t count_ = 0, header_line_ = 0, comma_line_ = 0, point_line_ = 0;
+  std::size_t count_ = 0, header_line_ = 0, comma_line_ = 0, point_line_ = 0, other_lines_ = 0;
   bool cut_ = false, labelled_ = false;
   std::vector<std::vector<std::string>> headers_;
+  std::vector<std::string> labels_;  // where each line has them
   std::vector<Place> places_;
+  std::vector<Cells> cells_;
   std::vector<std::vector<double>> columns_;
   std::vector<std::size_t> lines_;
   StampReader reader_;

@@ -26,8 +26,11 @@ columns, by their name, by its end (position of /joint1/position) or beginning, 
   --measured COLUMNS  disturbances that the controller will measure, too (fan,flow): their gain, lag
                       and dead time are found; or a known effect (the sine of the angle for
                       gravity); may be repeated
-  --time-unit UNIT    h, min, s, ms, us, ns (default: detected)
-  --sample-time S     seconds between rows, if there is no time column
+  --time-unit UNIT    day, h, min, s, ms, us, 100ns, ns (default: by name, or value and step)
+  --sample-time S     seconds between rows, if there is no time column; with --time: of a column
+                      that counts rows
+  --literal NAMES     not to be read into the log: changes (an empty field or a missing row says
+                      that nothing changed), late-u (u was logged a row late)
   --wrap TURN         y is an angle that begins anew after a turn (360, 6.283185, 4096); 0: it does
                       not (default: detected, with an alarm)
   --separator C       one character, or the word tab (default: detected)
@@ -143,6 +146,17 @@ Settings read_arguments(int argc, const char* const* argv) {
        }},
       {"time-unit", [&](const auto& text) { s.time_unit = text; }},
       {"sample-time", [&](const auto& text) { s.sample_time = positive("sample-time", text); }},
+      {"literal",
+       [&](const std::string& text) {
+         for (std::size_t at = 0; at <= text.size();) {
+           const auto comma = std::min(text.find(',', at), text.size());
+           const std::string name = text.substr(at, comma - at);
+           if (name != "changes" && name != "late-u")
+             throw LogError("--literal: '" + name + "' is none of changes, late-u");
+           s.literal.insert(name);
+           at = comma + 1;
+         }
+       }},
       {"wrap",
        [&](const auto& text) {
          s.wrap = number("wrap", text);

@@ -91,19 +91,13 @@ int from_log::command(int argc, char** argv, const Beside& beside) {
       return all_clear;
     }
     const Outcome outcome = work_out(settings);
+    for (const auto& note : outcome.input.notes) std::printf("%s\n", note.c_str());
     for (const Alarm& alarm : outcome.findings.alarms)
       std::fprintf(stderr, "ALARM %s: %s\n", alarm.name.c_str(), alarm.text.c_str());
     const char* mark = "refused: ";
     for (const auto& line : why_refused(outcome.findings)) {
       std::fprintf(stderr, "%s%s\n", mark, line.c_str());
       mark = "  ";
-    }
-    if (outcome.input.unit_assumed && outcome.findings.seen &&
-        outcome.findings.rows.sample_time > 0.5) {
-      std::printf(
-          "Nothing says in which unit %s is: it was read in seconds. If it is in another "
-          "one, set --time-unit.\n",
-          outcome.input.time.c_str());
     }
     for (const auto& line : in_short(outcome.findings, outcome.design))
       std::printf("%s\n", line.c_str());

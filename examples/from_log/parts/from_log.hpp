@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <functional>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -37,11 +38,13 @@ struct Settings {
   std::optional<std::string_view> bytes{};  ///< of the file, where there is none on a disk
   std::string time, u, y;                   ///< columns; empty: found by their names
   std::vector<std::string> measured;        ///< columns of measured disturbances
-  std::string time_unit;                    ///< h, min, s, ms, us or ns; empty: found out
-  double sample_time = 0;                   ///< s, where there is no time
-  char separator = 0;                       ///< 0: found out
-  std::optional<double> wrap;  ///< y begins anew after so much; 0: it does not; none: found out
-  std::vector<int> orders{};   ///< empty: 1 for a speed, a temperature or a level, else found out
+  std::string time_unit;                    ///< day, h, min, s, ms, us, 100ns, ns; empty: found
+  double sample_time = 0;                   ///< s from row to row, where there is no time, or its
+                                            ///< column counts rows
+  std::set<std::string> literal;  ///< what is not to be read into the log: changes, late-u
+  char separator = 0;             ///< 0: found out
+  std::optional<double> wrap;     ///< y begins anew after so much; 0: it does not; none: found out
+  std::vector<int> orders{};  ///< empty: 1 for a speed, a temperature or a level, else found out
   std::optional<double> expected_gain;  ///< b0 as the user believes it to be
   std::optional<std::pair<double, double>> limits;
   std::optional<double> friction;  ///< as in TuneModel; none: not known
@@ -80,13 +83,15 @@ struct Input {
   std::string time, u, y;             ///< names of the columns
   std::vector<std::string> measured;  ///< those of the measured disturbances
   std::string time_unit = "s";
-  bool unit_assumed = false;      ///< nothing says that it is seconds
-  esokit::Log log;                ///< s from the first stamp on; u held from its row to the next
-  std::vector<std::size_t> line;  ///< of the file, for each row
-  bool merged = false;            ///< topics with stamps of their own were brought together
-  bool cut = false;               ///< the last line was cut
-  double turn = 0;                ///< after which y began anew, before it was made continuous
-  bool first_order = false;       ///< y is a speed, a temperature or a level by its name
+  bool unit_assumed = false;       ///< nothing says its unit but value and step
+  bool counter = false;            ///< its numbers began anew
+  std::vector<std::string> notes;  ///< what was read into the file, for the first lines
+  esokit::Log log;                 ///< s from the first stamp on; u held from its row to the next
+  std::vector<std::size_t> line;   ///< of the file, for each row
+  bool merged = false;             ///< topics with stamps of their own were brought together
+  bool cut = false;                ///< the last line was cut
+  double turn = 0;                 ///< after which y began anew, before it was made continuous
+  bool first_order = false;        ///< y is a speed, a temperature or a level by its name
   std::vector<Alarm> alarms;
 };
 
@@ -118,7 +123,9 @@ struct Findings {
 /// The unit for a time of this size: units in a second, and its name.
 inline std::pair<double, const char*> unit_of(double seconds) {
   if (seconds < 0.9995) return {1e3, "ms"};
-  return {1, "s"};
+  if (seconds < 600) return {1, "s"};
+  if (seconds < 3 * 3600) return {1.0 / 60, "min"};
+  return {1.0 / 3600, "h"};
 }
 
 /// A time in words, three digits of it.

@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "from_log/parts/clock.hpp"
 #include "from_log/parts/from_log.hpp"
 #ifndef __wasi__
 #include "common/system.hpp"
@@ -26,25 +27,6 @@ using esokit::examples::number_text;
 std::string lower(std::string text) {
   for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   return text;
-}
-
-/// Seconds of a unit of time, 0 of any other word.
-double seconds_of(const std::string& unit) {
-  static const std::map<std::string, double> all = {
-      {"s", 1},         {"sec", 1},          {"secs", 1},         {"second", 1},
-      {"seconds", 1},   {"ms", 1e-3},        {"msec", 1e-3},      {"millis", 1e-3},
-      {"us", 1e-6},     {"\xc2\xb5s", 1e-6}, {"\xce\xbcs", 1e-6}, {"usec", 1e-6},
-      {"micros", 1e-6}, {"ns", 1e-9},        {"nsec", 1e-9},      {"min", 60},
-      {"h", 3600}};
-  const auto at = all.find(unit);
-  return at == all.end() ? 0.0 : at->second;
-}
-
-std::string unit_name(double seconds) {
-  for (const char* unit : {"h", "min", "s", "ms", "us"}) {
-    if (seconds > 0.5 * seconds_of(unit)) return unit;
-  }
-  return "ns";
 }
 
 std::vector<std::string> split_words(const std::string& text) {
@@ -105,30 +87,30 @@ struct Usual {
   bool first_order = false;
 };
 constexpr Usual usual_names[] = {
-    {" t time stamp timestamp datetime times secs seconds clock ticks millis micros ", 't'},
+    {" t time stamp timestamp datetime times secs sec seconds clock ticks millis micros uptime "
+     "elapsed ",
+     't'},
     {" x_value zeit uhrzeit zeitstempel temps heure horodatage tiempo hora tempo ", 't'},
-    {" u input torque effort command cmd pwm voltage volts current force duty drive actuator "
-     "control "
-     "tau power heater q1 ",
+    {" u input torque effort command commanded cmd pwm voltage volts current force duty drive "
+     "actuator control tau power heater q1 action throttle mv op co valve pump thrust ",
      'u'},
     {" spannung strom drehmoment moment kraft leistung eingang stellgroesse stellgr\xc3\xb6\xc3\x9f"
-     "e stellwert tension courant couple commande entr\xc3\xa9"
-     "e voltaje tensi\xc3\xb3n corriente par "
-     "entrada tensione corrente coppia ",
+     "e stellwert heizung heizer heizleistung ventil pumpe drossel gas tension courant couple "
+     "commande entr\xc3\xa9"
+     "e chauffage voltaje tensi\xc3\xb3n corriente par entrada tensione corrente coppia ",
      'u'},
-    {" y output position pos angle theta measurement meas height phi ", 'y'},
-    {" winkel lage weg ausgang messwert sortie posicion posici\xc3\xb3n \xc3\xa1ngulo angulo "
-     "salida "
-     "posizione angolo uscita ",
+    {" y position pos angle theta measurement meas measured height phi distance odometer pv "
+     "process actual ",
+     'y'},
+    {" winkel lage weg ausgang messwert istwert sortie posicion posici\xc3\xb3n \xc3\xa1ngulo "
+     "angulo salida posizione angolo uscita ",
      'y'},
     {" temperature temp speed velocity vel rate level rpm t1 gyro ", 'y', true},
     {" drehzahl geschwindigkeit temperatur f\xc3\xbcllstand fuellstand pegel vitesse temp\xc3\xa9"
      "rature niveau velocidad temperatura nivel velocit\xc3\xa0 livello ",
      'y', true}};
 
-/// What is usual about a name, if anything. LabVIEW's X_Value is known as a whole: an x is none.
-const Usual* usual(const std::string& name) {
-  const std::string word = lower(name) == "x_value" ? "x_value" : words(name).front();
+const Usual* usual_word(const std::string& word) {
   const std::string blank = " " + word + " ";
   for (const Usual& line : usual_names) {
     if (!word.empty() && std::string_view(line.words).find(blank) != std::string_view::npos)
@@ -137,71 +119,163 @@ const Usual* usual(const std::string& name) {
   return nullptr;
 }
 
-/// The only column whose first word is usual for it, of those that are not `taken` by a name.
+/// What is wanted is neither u nor y: target_speed, T_set, SP, Sollwert.
+bool is_target(const std::string& name) {
+  constexpr std::string_view targets =
+      " set setpoint sp ref reference target desired goal soll sollwert consigne ";
+  const auto parts = words(name);
+  return std::any_of(parts.begin(), parts.end(), [&](const std::string& part) {
+    return targets.find(" " + part + " ") != std::string_view::npos;
+  });
+}
+
+/// What is usual about a name, if anything: its first word, of two that differ the last, which says
+/// what it is (heater_temperature); else any word. LabVIEW's X_Value is known as a whole: an x is
+/// none.
+const Usual* usual(const std::string& name) {
+  if (lower(name) == "x_value") return usual_word("x_value");
+  auto parts = words(name);
+  while (parts.size() > 1 && (seconds_of(parts.back()) > 0.0 || parts.back().size() < 2))
+    parts.pop_back();
+  const Usual* first = usual_word(parts.front());
+  const Usual* last = usual_word(parts.back());
+  if (first != nullptr && last != nullptr && first->column != 't' && last->column != 't')
+    return last->column == first->column ? first : last;
+  if (first != nullptr) return first;
+  for (auto part = parts.rbegin(); part != parts.rend(); ++part) {
+    const Usual* found = usual_word(*part);
+    if (found != nullptr && found->column != 't') return found;
+  }
+  return nullptr;
+}
+
+/// The only column whose name is usual for it, of those that are not `taken` by a name; of several
+/// the one that is called so and nothing else. `output` is y, unless another column is: then it is
+/// u.
 std::string guess(const LogFile& file, const char* option, const std::string& given,
-                  const std::vector<std::string>& taken) {
+                  const std::vector<std::string>& taken, std::vector<std::string>& notes) {
   if (!given.empty()) return given;
-  std::string there = file.there();
+  std::string there = "there are " + file.there();
   for (const auto& names : file.headers()) {
-    std::vector<std::size_t> fits, whole;
+    std::vector<std::size_t> fits, whole, outputs;
+    bool other_y = false;
     for (std::size_t i = 0; i < names.size(); ++i) {
-      const Usual* line = usual(names[i]);
-      if (line == nullptr || line->column != option[0]) continue;
-      if (std::find(taken.begin(), taken.end(), names[i]) != taken.end()) continue;
+      const bool free = std::find(taken.begin(), taken.end(), names[i]) == taken.end();
+      const std::string first = words(names[i]).front();
+      if (free && (first == "output" || first == "out")) outputs.push_back(i);
+      const Usual* line = is_target(names[i]) ? nullptr : usual(names[i]);
+      if (line == nullptr) continue;
+      other_y = other_y || line->column == 'y';
+      if (line->column != option[0] || !free) continue;
       fits.push_back(i);
-      if (lower(names[i]) == words(names[i]).front()) whole.push_back(i);
+      if (lower(names[i]) == first) whole.push_back(i);
     }
     // y is y, where there is y_filtered, too.
     if (whole.size() == 1) fits = whole;
+    if (fits.empty() && outputs.size() == 1 && option[0] == (other_y ? 'u' : 'y')) {
+      fits = outputs;
+      if (other_y) {
+        notes.push_back("'" + names[fits[0]] +
+                        "' was taken for u, the output of the controller, as another column is y.");
+      }
+    }
     if (fits.size() == 1) return names[fits[0]];
     if (fits.empty()) continue;
-    there.clear();
-    for (const std::size_t i : fits) there += (there.empty() ? "" : ", ") + names[i];
+    there = "it may be ";
+    for (const std::size_t i : fits) there += (i == fits[0] ? "" : ", ") + names[i];
     break;
   }
+  std::string known;
+  for (const std::string& name : taken) {
+    if (!name.empty()) known += (known.empty() ? "" : ", ") + name;
+  }
   throw LogError("which column is " + std::string(option) + "? Name it with --" + option +
-                 " COLUMN; there are " + there);
+                 " COLUMN; " + there + (known.empty() ? "" : " (taken: " + known + ")") +
+                 (option[0] == 't'
+                      ? "; or, if there is no time, give the time from row to row with "
+                        "--sample-time SECONDS"
+                      : ""));
 }
 
-/// Finds the unit of the stamps: as told, by the column's name or the line of units, since 1970, or
-/// by what a step of a controller can be. Only the last is a guess, and an alarm.
-double find_unit(const Settings& settings, Input& input, const std::string& below, double first,
-                 double step) {
+/// "us (rows 2 ms apart), ms (rows 2 s apart)"
+std::string units_text(const std::vector<double>& units, double step) {
+  std::string text;
+  for (const double unit : units) {
+    text += (text.empty() ? "--time-unit " : ", --time-unit ") + std::string(unit_name(unit)) +
+            " (rows " + time_text(step * unit) + " apart)";
+  }
+  return text;
+}
+
+/// A step that the file itself names: a column "Increment" with a number below it, as scopes write.
+std::string increment_of(const LogFile& file) {
+  const auto& headers = file.headers();
+  for (std::size_t c = 0; headers.size() > 1 && c < headers[0].size(); ++c) {
+    const std::string name = lower(headers[0][c]);
+    if (name != "increment" && name != "sample interval" && name != "tinc") continue;
+    if (c < headers[1].size() && std::strtod(headers[1][c].c_str(), nullptr) > 0.0)
+      return "; the file says " + headers[0][c] + " " + headers[1][c] + ": --sample-time " +
+             headers[1][c];
+  }
+  return "";
+}
+
+/// Finds the unit of the stamps: as told, by the column's name, the line of units or what stands
+/// behind the numbers, else by value and step. What stays open is asked for.
+double find_unit(const Settings& settings, const LogFile& file, const ClockRead& clock,
+                 Input& input) {
+  if (settings.sample_time > 0.0) return settings.sample_time / clock.step;
   if (!settings.time_unit.empty()) {
-    const double unit = seconds_of(settings.time_unit);
+    const double unit = seconds_of(lower(settings.time_unit));
     if (unit > 0.0) return unit;
-    throw LogError("--time-unit: '" + settings.time_unit + "' is none of h, min, s, ms, us, ns");
+    throw LogError("--time-unit: '" + settings.time_unit +
+                   "' is none of day, h, min, s, ms, us, 100ns, ns");
   }
-  const auto parts = words(input.time);
-  double named = seconds_of(parts.back());
-  if (named == 0.0) named = seconds_of(split_words(lower(below)).front());
-  // Between 1998 and 2049; and a step that a controller can have.
-  if (named == 0.0) {
-    for (const double unit : {1.0, 1e-3, 1e-6, 1e-9}) {
-      if (first * unit > 0.9e9 && first * unit < 2.5e9 && step * unit < 50.0) return unit;
-    }
-  }
-  input.unit_assumed = !(named > 0.0);
-  const double read = named > 0.0 ? named : 1.0;
-  const double T = step * read;
-  const bool minutes = std::abs(T / 60 - std::round(T / 60)) < 1e-6;
-  if (T < 50.0 || minutes) {
-    if (T < 2e-6) {
+  const std::string column = "column " + input.time;
+  double named = seconds_of(words(input.time).back());
+  if (named == 0.0) named = seconds_of(split_words(lower(file.below(2))).front());
+  if (named == 0.0) named = seconds_of(lower(file.cell_unit(2)));
+  if (named > 0.0) {
+    const double T = clock.step * named;
+    const bool date = detail::is_date(clock.first, named);
+    if (T < 2e-6 || T > 7300 || !(detail::slow(T) || date) ||
+        !(date || std::abs(clock.last * named) < 400 * 86400.0)) {
       input.alarms.push_back(
-          {"time-unit", "The time between two rows (column " + input.time + ") would be " +
-                            number_text(T, 3) +
-                            " s, so the unit of time must be another one. Set --time-unit."});
+          {"time-unit", "By the name of " + column + " it is in " + unit_name(named) +
+                            ", and then rows are " + time_text(T) +
+                            " apart. All times on this page depend on it. Confirm it with "
+                            "--time-unit " +
+                            unit_name(named) + ", or set the right one."});
     }
-    return read;
+    return named;
   }
-  const double guessed = read * (step >= 1e5 ? 1e-9 : step >= 100.0 ? 1e-6 : 1e-3);
-  input.alarms.push_back(
-      {"time-unit", "In seconds, the time between two rows (column " + input.time + ") would be " +
-                        number_text(T, 4) + " s. It was read as " + unit_name(guessed) +
-                        ", so that T = " + number_text(step * guessed, 4) +
-                        " s. All times on this page depend on it. Confirm it with --time-unit " +
-                        unit_name(guessed) + ", or use --time-unit s if seconds are right."});
-  return guessed;
+  const ClockVerdict verdict = judge_clock(clock);
+  if (!verdict.told()) {
+    const bool counted =
+        clock.whole && clock.first < 1.5 && clock.first > -0.5 && std::abs(clock.step - 1.0) < 1e-9;
+    throw LogError(settings.file + ": in which unit is the time? " +
+                   (counted ? "C" + column.substr(1) + " counts the rows, and may be seconds, too"
+                            : "Nothing says it of " + column + ", which begins at " +
+                                  number_text(clock.first, 10) + " and rises by " +
+                                  number_text(clock.step, 4) + " from row to row") +
+                   ". Set one of " + units_text(verdict.open, clock.step) +
+                   ", or the time from row to row: --sample-time SECONDS" + increment_of(file));
+  }
+  const std::string unit = unit_name(verdict.unit);
+  input.unit_assumed = true;
+  const std::string rows = "rows are " + time_text(clock.step * verdict.unit) + " apart";
+  if (verdict.doubtful) {
+    input.alarms.push_back(
+        {"time-unit",
+         "Nothing says in which unit " + column + " is: it was read as " + unit + ", so that " +
+             rows + ". All times on this page depend on it. Confirm it with --time-unit " + unit +
+             ", or set the right one (" + units_text(verdict.open, clock.step) + ")."});
+  } else {
+    input.notes.push_back("Time: by value and step, " + column + " is in " + unit +
+                          (verdict.date ? " and has a date" : "") +
+                          (input.merged ? "" : "; " + rows) + ". If not, set --time-unit.");
+  }
+  return verdict.unit;
 }
 
 double share_missing(const std::vector<double>& values) {
@@ -247,7 +321,6 @@ void merge(Input& input) {
   }
   input.log = std::move(out);
   input.line = std::move(lines);
-  input.merged = true;
 }
 
 /// An angle that begins anew after a turn is no motion: made continuous, with an alarm unless the
@@ -324,6 +397,223 @@ LogSource source_of(const Settings& settings) {
 #endif
 }
 
+namespace {
+
+/// Leaves out the rows of which `keep` is false.
+void keep_rows(Input& input, std::vector<double>& stamps, const std::vector<bool>& keep) {
+  const auto filter = [&](auto& values) {
+    std::size_t to = 0;
+    for (std::size_t k = 0; k < values.size(); ++k) {
+      if (keep[k]) values[to++] = values[k];
+    }
+    values.resize(to);
+  };
+  filter(input.log.u);
+  filter(input.log.y);
+  for (auto& column : input.log.columns) filter(column);
+  filter(input.line);
+  filter(stamps);
+}
+
+/// Makes stamps rise: counters that began anew, and stamps that are repeated or rounded.
+void mend_stamps(const Settings& settings, const LogFile& file, Input& input,
+                 std::vector<double>& stamps) {
+  const double origin = file.stamps().origin();
+  const char* since = file.stamps().numbers() ? "" : " s after the first row";
+  const std::string in = " in column " + input.time;
+  for (std::size_t i = 0; i < stamps.size(); ++i) {
+    if (!std::isfinite(stamps[i])) {
+      throw LogError(file.where(i) + "the time is missing" + in +
+                     "; if rows come at equal steps, leave it out: --sample-time SECONDS");
+    }
+  }
+  const ClockRepair turned = file.stamps().numbers() ? unwrap_counter(stamps) : ClockRepair{};
+  input.counter = turned.turns > 0;
+  if (turned.turns > 0) {
+    input.notes.push_back("Time" + in + " begins anew after " + number_text(turned.turn, 10) +
+                          ", as a counter of the processor does (" + std::to_string(turned.turns) +
+                          (turned.turns == 1 ? " time" : " times") + "): made continuous.");
+  }
+  for (std::size_t i = 1; i < stamps.size(); ++i) {
+    if (!(stamps[i] < stamps[i - 1])) continue;
+    throw LogError(file.where(i) + "time runs backwards" + in + ", from " +
+                   number_text(origin + stamps[i - 1], 15) + " to " +
+                   number_text(origin + stamps[i], 15) + since +
+                   ": the clock was set, or the file contains two recordings. Cut the file there, "
+                   "or, if rows come at equal steps, leave the time out: --sample-time SECONDS");
+  }
+  if (input.merged) return;
+  const ClockRepair mended = spread_stamps(stamps);
+  if (mended.repeated == 0 && !mended.spread) return;
+  std::size_t first = 1;
+  const std::string how_many = std::to_string(mended.repeated) +
+                               (mended.repeated == 1 ? " row has" : " rows have") +
+                               " the time stamp of the row before" + in;
+  if (!mended.spread) {
+    std::vector<bool> keep(stamps.size(), true);
+    for (std::size_t k = 1; k < stamps.size(); ++k) {
+      if (stamps[k] > stamps[k - 1]) continue;
+      keep[k - 1] = false;
+      if (first == 1) first = k;
+    }
+    const std::string at = std::to_string(file.line(first));
+    if (stamps.size() < 10 || !mended.left_out) {
+      throw LogError(file.where(first) + "time stands still" + in + " at " +
+                     number_text(origin + stamps[first], 15) + since +
+                     "; if rows come at equal steps, leave it out: --sample-time SECONDS");
+    }
+    keep_rows(input, stamps, keep);
+    input.alarms.push_back(
+        {"repeated", how_many + " (first at line " + at +
+                         "), and the earlier one was left out. If rows come at equal steps, set "
+                         "--sample-time instead."});
+    return;
+  }
+  input.alarms.push_back(
+      {"repeated",
+       (mended.repeated > 0 ? how_many : "Time stamps" + in + " are rounded") +
+           ", as a clock with too few digits writes: rows were put at equal steps "
+           "between them. Better tell the time from row to row: --sample-time " +
+           (settings.sample_time > 0 ? number_text(settings.sample_time) : std::string("SECONDS")) +
+           "."});
+}
+
+/// Whether values were written only where they changed, by the steps between them: none is zero,
+/// though many are one of the resolution, so that there must often have been none at all.
+bool only_changes(const std::vector<double>& steps) {
+  double least = std::numeric_limits<double>::infinity();
+  std::size_t still = 0, single = 0;
+  for (const double step : steps) {
+    if (step > 0)
+      least = std::min(least, step);
+    else
+      ++still;
+  }
+  for (const double step : steps) single += step > 0 && step < 1.5 * least ? 1U : 0U;
+  return 200 * still < steps.size() && single >= 20 && 8 * single > steps.size();
+}
+/// The steps between the values that are there.
+std::vector<double> steps_of(const std::vector<double>& values) {
+  std::vector<double> steps;
+  double last = std::nan("");
+  for (const double value : values) {
+    if (!std::isfinite(value)) continue;
+    if (std::isfinite(last)) steps.push_back(std::abs(value - last));
+    last = value;
+  }
+  return steps;
+}
+
+/// A field that is empty, or a row that is missing, because nothing changed: what was there holds.
+void hold_changes(const Settings& settings, Input& input) {
+  if (settings.literal.contains("changes")) return;
+  esokit::Log& log = input.log;
+  const std::string off = " If not (values were lost), use --literal changes.";
+  for (auto* column : {&log.y, &log.u}) {
+    const double missing = share_missing(*column);
+    const std::string name = column == &log.y ? input.y : input.u;
+    const auto first = std::find_if(column->begin(), column->end(),
+                                    [](double value) { return std::isfinite(value); });
+    const bool switched = column == &log.u && missing > 0.02 && share_missing(log.y) < 0.02;
+    if (!(missing > 0.02) || !(switched || only_changes(steps_of(*column)))) continue;
+    double held = *first;
+    for (double& value : *column) {
+      if (std::isfinite(value)) held = value;
+      value = held;
+    }
+    if (!switched || only_changes(steps_of(*column)))
+      input.notes.insert(input.notes.begin(),
+                         "Column " + name + " has a value only where it changed (" +
+                             number_text(100 * missing, 2) +
+                             " % of its fields are empty): the last one was held." + off);
+  }
+  // Whole rows: of two with the same u, y always differs, and the steps of time are multiples.
+  // Across a change of u, y may stay.
+  std::vector<double> moves, steps;
+  for (std::size_t k = 0; k < log.y.size(); ++k) {
+    if (!std::isfinite(log.y[k]) || !std::isfinite(log.u[k])) return;
+    if (k == 0) continue;
+    steps.push_back(log.time[k] - log.time[k - 1]);
+    if (!(log.u[k] < log.u[k - 1]) && !(log.u[k] > log.u[k - 1]))
+      moves.push_back(std::abs(log.y[k] - log.y[k - 1]));
+  }
+  if (steps.size() < 50) return;
+  std::vector<double> sorted = steps;
+  std::sort(sorted.begin(), sorted.end());
+  const double T = sorted[sorted.size() / 20];
+  std::size_t longer = 0, off_grid = 0, rows = log.y.size();
+  for (const double step : steps) {
+    const double times = step / T;
+    longer += times > 1.5 ? 1U : 0U;
+    off_grid += std::abs(times - std::round(times)) > 0.2 ? 1U : 0U;
+    rows += times > 1.5 ? static_cast<std::size_t>(std::min(std::round(times) - 1, 1e9)) : 0;
+  }
+  if (20 * longer < steps.size() || 4 * moves.size() < steps.size() || !only_changes(moves)) return;
+  if (20 * off_grid > steps.size() || rows > 50 * log.y.size()) {
+    throw LogError(settings.file +
+                   ": rows were written only where something changed, and not at a fixed rate: "
+                   "when y stood still is not known. Log every row, or, if rows were lost for "
+                   "another reason, use --literal changes");
+  }
+  esokit::Log full;
+  full.columns.resize(log.columns.size());
+  std::vector<std::size_t> lines;
+  for (std::size_t k = 0; k < log.y.size(); ++k) {
+    const double times = k + 1 < log.y.size() ? std::round(steps[k] / T) : 1.0;
+    for (double i = 0; i < times; ++i) {
+      full.time.push_back(log.time[k] + (times > 1 ? i * steps[k] / times : 0.0));
+      full.u.push_back(log.u[k]);
+      full.y.push_back(log.y[k]);
+      for (std::size_t c = 0; c < log.columns.size(); ++c)
+        full.columns[c].push_back(log.columns[c][k]);
+      lines.push_back(input.line[k]);
+    }
+  }
+  input.notes.insert(input.notes.begin(), "Rows were written only where something changed: " +
+                                              std::to_string(full.y.size() - log.y.size()) +
+                                              " rows in which nothing did were put back." + off);
+  log = std::move(full);
+  input.line = std::move(lines);
+}
+
+/// The same column twice is no log.
+void refuse_same(const Settings& settings, const LogFile& file,
+                 const std::vector<std::string>& wanted, bool timed) {
+  const auto role = [&](std::size_t i) {
+    return i == 0 ? "u" : i == 1 ? "y" : timed && i == 2 ? "time" : "measured";
+  };
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      if (file.place(i) != file.place(j)) continue;
+      throw LogError(settings.file + ": " + role(j) + " (" + wanted[j] + ") and " + role(i) + " (" +
+                     wanted[i] + ") are the same column, number " + std::to_string(file.place(i)) +
+                     ", '" + file.name(i) + "'; @3 is the third column, whatever the names are");
+    }
+  }
+  if (file.column(0) != file.column(1)) return;
+  throw LogError(settings.file + ": u (" + file.name(0) + ") and y (" + file.name(1) +
+                 ") have the same numbers in all rows: one of them was logged twice");
+}
+
+void note_cells(const LogFile& file, const std::vector<std::string>& wanted, Input& input) {
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    if (file.switched(i) > 0)
+      input.notes.push_back("In column " + file.name(i) + " ON or true is 1, OFF or false is 0.");
+    if (file.failed(i) > 0) {
+      input.notes.push_back("In column " + file.name(i) + " " + std::to_string(file.failed(i)) +
+                            (file.failed(i) == 1 ? " field is" : " fields are") +
+                            " an error instead of a number: rows that are missing.");
+    }
+  }
+  if (file.other_lines() > 0) {
+    input.notes.push_back(std::to_string(file.other_lines()) +
+                          (file.other_lines() == 1 ? " line" : " lines") +
+                          " without the labels of the others were left out.");
+  }
+}
+
+}  // namespace
+
 Input read_log(const Settings& settings) {
   const LogSource source = source_of(settings);
   const LogFile header(source, settings.separator);
@@ -331,12 +621,14 @@ Input read_log(const Settings& settings) {
   const bool timed = !(settings.sample_time > 0.0) || !settings.time.empty();
   std::vector<std::string> taken = settings.measured;
   taken.insert(taken.end(), {settings.u, settings.y, settings.time});
-  std::vector<std::string> wanted = {guess(header, "u", settings.u, taken),
-                                     guess(header, "y", settings.y, taken)};
-  if (timed) wanted.push_back(guess(header, "time", settings.time, taken));
+  std::vector<std::string> wanted = {guess(header, "u", settings.u, taken, input.notes),
+                                     guess(header, "y", settings.y, taken, input.notes)};
+  if (timed) wanted.push_back(guess(header, "time", settings.time, taken, input.notes));
   wanted.insert(wanted.end(), settings.measured.begin(), settings.measured.end());
   const LogFile file(source, wanted, settings.separator,
                      timed ? std::optional<std::size_t>(2) : std::nullopt);
+  refuse_same(settings, file, wanted, timed);
+  note_cells(file, wanted, input);
   input.u = file.name(0);
   input.y = file.name(1);
   const Usual* kind = usual(input.y);
@@ -361,37 +653,30 @@ Input read_log(const Settings& settings) {
   }
   input.time = file.name(2);
   std::vector<double> stamps = file.column(2);
-  const bool merged = no_u > 0.2 || no_y > 0.2;
+  const auto topics = [&] {
+    return share_missing(input.log.u) > 0.2 || share_missing(input.log.y) > 0.2;
+  };
+  input.merged = topics();
+  mend_stamps(settings, file, input, stamps);
   const double origin = file.stamps().origin();
-  const char* since = file.stamps().numbers() ? "" : " s after the first row";
-  for (std::size_t i = 0; i < stamps.size(); ++i) {
-    const std::string in = " in column " + input.time;
-    if (!std::isfinite(stamps[i])) throw LogError(file.where(i) + "the time is missing" + in);
-    if (i == 0 || stamps[i] > stamps[i - 1]) continue;
-    if (stamps[i] < stamps[i - 1]) {
-      throw LogError(file.where(i) + "time runs backwards" + in + ", from " +
-                     number_text(origin + stamps[i - 1], 15) + " to " +
-                     number_text(origin + stamps[i], 15) + since +
-                     ": the clock was set, or the file contains two recordings");
-    }
-    if (!merged) {
-      throw LogError(file.where(i) + "time stands still" + in + " at " +
-                     number_text(origin + stamps[i], 15) + since);
-    }
-  }
-  std::vector<double> steps;
-  for (std::size_t i = 1; i < stamps.size(); ++i) {
-    if (stamps[i] > stamps[i - 1]) steps.push_back(stamps[i] - stamps[i - 1]);
-  }
+  ClockRead clock{.first = origin,
+                  .last = origin + stamps.back(),
+                  .step = usual_step(stamps),
+                  .whole = std::all_of(stamps.begin(), stamps.end(),
+                                       [&](double stamp) {
+                                         const double at = origin + stamp;
+                                         return !(at < std::floor(at)) && !(at > std::floor(at));
+                                       }),
+                  .counter = input.counter};
+  if (!(clock.step > 0.0)) throw LogError(settings.file + ": the log has only one sample");
   // Dates and times of day are read in seconds.
-  const double unit = file.stamps().numbers()
-                          ? find_unit(settings, input, file.below(2), origin,
-                                      steps.empty() ? 1.0 : esokit::detail::median(steps))
-                          : 1.0;
-  input.time_unit = unit_name(unit);
+  const double unit = file.stamps().numbers() ? find_unit(settings, file, clock, input) : 1.0;
+  input.time_unit = settings.sample_time > 0.0 ? "rows" : unit_name(unit);
   for (double& stamp : stamps) stamp *= unit;
   input.log.time = std::move(stamps);
-  if (merged) merge(input);
+  hold_changes(settings, input);
+  input.merged = topics();
+  if (input.merged) merge(input);
   unwrap(settings, input);
   if (input.log.time.size() < 2) throw LogError(settings.file + ": the log has only one sample");
   // A gap is bridged or cut out; one so long is a clock that was set, or two recordings.

@@ -259,9 +259,11 @@ std::vector<CsvRow> log_table(const Input& input, const Findings& findings) {
   rows.push_back({"u", input.u, "held by the actuator from its row to the next"});
   rows.push_back({"time", input.time.empty() ? "none" : input.time,
                   input.time.empty() ? "equal steps, by --sample-time"
-                  : input.unit_assumed
-                      ? "read in " + input.time_unit + "; this is a guess, see --time-unit"
-                      : "read in " + input.time_unit});
+                  : input.time_unit == "rows"
+                      ? "rows that are counted, by --sample-time"
+                      : "read in " + input.time_unit +
+                            (input.unit_assumed ? ", by value and step; see --time-unit" : "")});
+  for (const std::string& note : input.notes) rows.push_back({"read into it", note, ""});
   rows.push_back(
       {"rows", std::to_string(log.rows),
        input.merged ? "u and y have their own time stamps: a row for each y, u averaged in between"
