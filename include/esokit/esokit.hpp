@@ -2,12 +2,14 @@
 /// Everything of esokit. Firmware may prefer the headers that it uses, one file an observer.
 #pragma once
 
+#include <esokit/adapter/actuator_map.hpp>
 #include <esokit/adapter/adapter.hpp>
 #include <esokit/adapter/correction_weights.hpp>
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/guarded.hpp>
 #include <esokit/adapter/guarded_states.hpp>
 #include <esokit/adapter/known_model.hpp>
+#include <esokit/adapter/mapped_input.hpp>
 #include <esokit/adapter/measured.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/variable_time.hpp>

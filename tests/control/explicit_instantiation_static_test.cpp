@@ -5,6 +5,7 @@
 
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/guarded.hpp>
+#include <esokit/adapter/mapped_input.hpp>
 #include <esokit/adapter/measured.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/variable_time.hpp>
@@ -38,6 +39,12 @@ template class WrappedOutput<OutlierGate<LinearEso<1>>>;
 template class DelayedInput<LinearEso<1>, 3>;
 template class Measured<LinearEso<1>, 1, 3>;
 template class PredictiveAdrc<Measured<LinearEso<1>, 1, 3>>;
+template class ActuatorMap<double>;
+template class MappedInput<LinearEso<1>>;
+template class MappedInput<Guarded<LinearEso<1>>>;
+template class Adrc<MappedInput<LinearEso<1>>>;
+template class PredictiveAdrc<MappedInput<LinearEso<1>>>;
+template class DisturbanceCompensator<MappedInput<LinearEso<1>>>;
 template class PredictiveAdrc<LinearEso<1>>;
 template class DisturbanceCompensator<LinearEso<1>>;
 template class MimoAdrc<LinearEso<1>, LinearEso<1>>;

@@ -8,6 +8,7 @@
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/guarded.hpp>
 #include <esokit/adapter/known_model.hpp>
+#include <esokit/adapter/mapped_input.hpp>
 #include <esokit/adapter/measured.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/variable_time.hpp>
@@ -117,6 +118,15 @@ struct Guards {
     config.controller_bandwidth = set(lane, again, 5);
     config.limits = {set(lane, again, -2), set(lane, again, 3), set(lane, again, 200)};
     return config;
+  }
+};
+
+struct Curved {
+  using Type = esokit::MappedInput<DelayedBy<LinearEso<1>>::Type, 3>;
+  static Type::Config config(int lane, bool again) {
+    return {.observer = Delayed::config(lane, again),
+            .curve = lane == 0 ? esokit::ActuatorCurve<double, 3>::dead_zone(0.5, 0.25)
+                               : esokit::ActuatorCurve<double, 3>::two_gains(again ? 3 : 2, 0.5)};
   }
 };
 
@@ -317,6 +327,11 @@ const auto observe_late = [](auto& o, const auto& x, int k) {
   return observe(o, x, k);
 };
 
+TEST(Packed, MappedInput) {
+  static_assert(Packed<Curved::Type, lanes>::at_once);
+  expect_lanes<Curved>(observe_late, seen);
+}
+
 TEST(Packed, DelayedInput) {
   static_assert(Packed<Delayed::Type, lanes>::at_once);
   expect_lanes<Delayed>(observe_late, seen);
@@ -409,6 +424,8 @@ TEST(Packed, AdrcOfAnAngle) {
 TEST(Packed, AdrcOfADelayedInput) {
   static_assert(Packed<InAdrc<Delayed>::Type, lanes>::at_once);
   expect_lanes<InAdrc<Delayed>>(control, controlled);
+  static_assert(Packed<InAdrc<Curved>::Type, lanes>::at_once);
+  expect_lanes<InAdrc<Curved>>(control, controlled);
   expect_lanes<InAdrc<DelayedBy<LinearEso<1>, 0, 3>>>(control, controlled);
 }
 

@@ -8,6 +8,7 @@
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/guarded.hpp>
 #include <esokit/adapter/known_model.hpp>
+#include <esokit/adapter/mapped_input.hpp>
 #include <esokit/adapter/measured.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/variable_time.hpp>
@@ -61,6 +62,8 @@ class Erased final : public AnyLoop {
     config.start_hold = {};
     config.missing = {};
     if constexpr (requires { config.observer.leak_time; }) config.observer.leak_time = 0;
+    if constexpr (requires { config.observer.observer.leak_time; })
+      config.observer.observer.leak_time = 0;
     if constexpr (requires { config.controller_bandwidth; }) config.controller_bandwidth *= factor;
     chain_config<Observer>(config.observer).observer_bandwidth *= factor;
     return config;
@@ -234,6 +237,8 @@ template <class O>
 using Told = Measured<O, 1, 4>;
 template <class O>
 using Known = KnownModel<O, Friction<0, double>>;
+template <class O>
+using Mapped = MappedInput<O, 3>;
 using Plain = LinearEso<1>;
 
 /// What goes into every adapter.
@@ -300,6 +305,15 @@ TEST(Pairs, OfMeasured) {
   obeys<WrappedOutput<Told<Plain>>>();
   obeys<Guarded<Told<Plain>>>();
   obeys_around<Told<Plain>>();
+}
+TEST(Pairs, OfMappedInput) {
+  around_all<Mapped>();
+  obeys<Mapped<Delayed<Plain>>>();
+  obeys<Mapped<Known<Plain>>>();
+  obeys<Mapped<WrappedOutput<Plain>>>();
+  obeys<Mapped<Told<Plain>>>();
+  obeys<Mapped<Guarded<Plain>>>();
+  obeys_around<Mapped<Plain>>();
 }
 TEST(Pairs, OfGuarded) {
   around_all<Guarded>();

@@ -4,6 +4,7 @@
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/guarded.hpp>
 #include <esokit/adapter/known_model.hpp>
+#include <esokit/adapter/mapped_input.hpp>
 #include <esokit/adapter/measured.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/variable_time.hpp>
@@ -134,6 +135,8 @@ TEST(Settings, OfAdaptersAreAdopted) {
   every_setting_is_adopted(NAMED(Measured<LinearEso<1>, 1, 4>));
   every_setting_is_adopted(NAMED(VariableTime<KnownModel<LinearEso<1>, Friction<0, double>>>));
   every_setting_is_adopted(NAMED(Guarded<LinearEso<1>>));
+  every_setting_is_adopted(NAMED(MappedInput<LinearEso<1>, 3>));
+  every_setting_is_adopted(NAMED(MappedInput<Guarded<LinearEso<1>>, 3>));
   every_setting_is_adopted(
       "Guarded<ModelEso>",
       {of<Guarded<ModelEso<ModelParts{.order = 1, .actuator = 1}>>>([](auto& c) {
@@ -176,6 +179,10 @@ TEST(Settings, OfControllersAreAdopted) {
   every_setting_is_adopted(
       "Adrc<Guarded>", {of<Guards>(), of<Guards>(by_gains), of<Guards>(softly), of<Guards>(unsaid)},
       {15, 16});
+  using Mapped = Adrc<MappedInput<LinearEso<1>, 3>>;
+  every_setting_is_adopted(
+      "Adrc<MappedInput>",
+      {of<Mapped>(), of<Mapped>(by_gains), of<Mapped>(softly), of<Mapped>(unsaid)}, {20, 21});
   using Plain = Adrc<LinearEso<1>>;
   every_setting_is_adopted(
       "Adrc", {of<Plain>(), of<Plain>(by_gains), of<Plain>(softly), of<Plain>(unsaid)}, {11, 12});

@@ -167,6 +167,21 @@ class Filler {
     }
   }
 
+  /// Of an actuator: any points, with slopes that a loop bears.
+  template <class Curve>
+  void curve(Curve& curve) {
+    curve.points = tape_.integer(0, static_cast<int>(curve.input.size()), "curve.points");
+    double u = -2, effect = -2;
+    for (std::size_t i = 0; i < curve.input.size(); ++i) {
+      number("curve.input", curve.input[i], {u, u + 0.2});
+      number("curve.effect", curve.effect[i], {effect, effect + 0.2});
+      u += 0.5;
+      effect += 0.5;
+    }
+    number("curve.slope_below", curve.slope_below, {0.7, 1.3});
+    number("curve.slope_above", curve.slope_above, {0.7, 1.3});
+  }
+
   template <class Rule>
   void missing(Rule& rule) {
     rule.most = tape_.integer(0, 40, "missing.most");
@@ -317,6 +332,7 @@ class Filler {
     // Adapters.
     MEMBER(delay, member = tape_.integer(0, 4, text))
     MEMBER(period, number(text, member, {6, 7}))
+    MEMBER(curve, curve(member))
     if constexpr (requires { config.most_in_a_row; }) {
       if (!tape_.once_in(8, "no gate")) {
         number("threshold", config.threshold, {0.5, 5, true});

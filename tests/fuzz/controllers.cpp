@@ -2,6 +2,7 @@
 // line.
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/guarded.hpp>
+#include <esokit/adapter/mapped_input.hpp>
 #include <esokit/adapter/measured.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/variable_time.hpp>
@@ -42,6 +43,10 @@ void add_controllers(std::vector<Kind>& kinds) {
   KIND(Adrc<Measured<VariableTime<LinearEso<1, double>>, 1, 3>>);
   KIND(PredictiveAdrc<Measured<LinearEso<2, double>, 1, 3>>);
   KIND(Adrc<Guarded<LinearEso<2, float>>>);
+  KIND(Adrc<MappedInput<LinearEso<2, float>, 4>>);
+  KIND(Adrc<MappedInput<Guarded<DelayedInput<LinearEso<1, double>, 3>>, 4>, ErrorBased>);
+  KIND(DisturbanceCompensator<MappedInput<LinearEso<1, double>, 4>>);
+  KIND(PredictiveAdrc<MappedInput<Measured<LinearEso<2, double>, 1, 3>, 4>>);
   KIND(Adrc<LinearEso<3, float>>);
   KIND(Adrc<ModelEso<ModelParts{.order = 1, .plant_poles = true, .actuator = 1}, double>>);
   // Without plant poles: under them y = 1 needs a load, and of a load a leak leaves an error.

@@ -1,6 +1,7 @@
 // Every observer and every adapter in its nestings; a new one joins by a line.
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/guarded.hpp>
+#include <esokit/adapter/mapped_input.hpp>
 #include <esokit/adapter/measured.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/variable_time.hpp>
@@ -42,6 +43,7 @@ void add_observers(std::vector<Kind>& kinds) {
   KIND(OutlierGate<LinearEso<2, float>>);
   KIND(Measured<LinearEso<2, float>, 1, 3>);
   KIND(Guarded<LinearEso<2, float>>);
+  KIND(MappedInput<WrappedOutput<LinearEso<2, double>>, 4>);
   KIND(Guarded<
        ModelEso<ModelParts{.order = 1, .actuator = 1, .sensor = 1, .resonators = 1}, float>>);
 #ifndef ESOKIT_ONE_TYPE

@@ -105,6 +105,13 @@ void fill(Config& config) {
   if constexpr (requires { config.period; }) config.period = 6;
   if constexpr (requires { config.ratio; }) config.ratio = 3;
   if constexpr (requires { config.delay; }) config.delay = 2;
+  if constexpr (requires { config.curve.points; }) {
+    config.curve = {.input = {-1, 0.25, 1},
+                    .effect = {-0.75, 0.125, 1.25},
+                    .points = 3,
+                    .slope_below = 0.875,
+                    .slope_above = 1.125};
+  }
   if constexpr (requires { config.most_lost; }) {
     config.inputs.fill({.gain = 3, .lag = 0.05, .dead_time = 0.02});
     config.most_lost = 2;
@@ -173,6 +180,11 @@ void step_observer(O& o, Signals& in, Played& out) {
   put(out, o.equilibrium(S(1), S(2)));
   ESOKIT_ANSWER(restarts)
   ESOKIT_ANSWER(innovation)
+  if constexpr (requires { o.map(); }) {
+    const S u = in.u<S>();
+    put(out, o.effect_of(u));
+    put(out, o.input_for(u));
+  }
   ESOKIT_ANSWER(gated)
   ESOKIT_ANSWER(bounded)
   ESOKIT_ANSWER(present_input_gain)

@@ -4,7 +4,8 @@
 ///
 /// The linear form is valid within the limits, while no measurement is missing and the law
 /// determines u. Adapters are analysed in their linear mode: an angle within one turn, an open
-/// gate, VariableTime with its present step, Guarded with its present b0 and full trust. A float
+/// gate, VariableTime with its present step, Guarded with its present b0 and full trust. Of a
+/// MappedInput the loop is that from y to the effect (ActuatorMap::gain_left). A float
 /// controller is analysed in double with its own gains. Of an Adrc that softens at the limits it is
 /// the law as designed, also while it is soft (`softness()` < 1): then the loop is another one. A
 /// type without a linear mode does not compile; use FrozenObserver for one mode of a switched or
@@ -14,6 +15,7 @@
 #include <cstddef>
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/guarded.hpp>
+#include <esokit/adapter/mapped_input.hpp>
 #include <esokit/adapter/measured.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/variable_time.hpp>
@@ -150,6 +152,13 @@ linear_observer(const Guarded<Observer>& observer) {
   for (int i = 0; i < form.from_u.rows(); ++i) form.from_u(i, 0) *= ratio;
   form.input_gain *= ratio;
   return form;
+}
+
+/// The linear form of what the curve of an actuator is around: its u is an effect.
+template <class Observer, int Points>
+requires detail::SaysObserver<Observer> &&(!LinearObserver<MappedInput<Observer, Points>>)  //
+    LinearObserverForm linear_observer(const MappedInput<Observer, Points>& observer) {
+  return linear_observer(observer.observer());
 }
 
 /// An observer and a law without a controller: a continuous observer, or a FrozenObserver for a

@@ -74,9 +74,9 @@ requires(detail::goes_into_a_loop<Observer>()) struct AdrcConfig {
 /// that may last: u is then no answer to y. An applied u that is not finite is reported, and
 /// replaced by the last output. No call allocates, throws or locks.
 ///
-/// Delays, angles, a changing sample time and known nonlinear terms are handled by the observer:
-/// put DelayedInput, WrappedOutput, VariableTime or KnownModel around it. They can be nested, with
-/// DelayedInput outside KnownModel.
+/// Delays, angles, a changing sample time, known nonlinear terms and the curve of an actuator are
+/// handled by the observer: put DelayedInput, WrappedOutput, VariableTime, KnownModel or
+/// MappedInput around it. They can be nested, with DelayedInput outside KnownModel.
 /// @tparam Form OutputBased or ErrorBased
 template <class Observer, class Form = OutputBased>
 requires(detail::goes_into_a_loop<Observer>()) class Adrc {
@@ -430,7 +430,7 @@ requires(detail::goes_into_a_loop<Observer>()) class Adrc {
       const S eased = soft_.control(law_, lacks(given));
       u = select(designed, u, detail::by_present_gain(observer(), eased));
     }
-    soft_.judge(u, loop_.limiter(), step_time());
+    soft_.judge(detail::input_for(observer(), u), loop_.limiter(), step_time());
     return u;
   }
 

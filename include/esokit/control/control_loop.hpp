@@ -215,7 +215,7 @@ class ControlLoop {
   ESOKIT_INLINE bool step_all(S& u, const S& measured, Law&& law) noexcept {
     if (!detail::LaneAccess::step(observer_, measured, limiter_.last())) return false;
     status_ = StepStatus::ok;
-    u = limited(law(!(special_ == false)));
+    u = limited(actuated(law(!(special_ == false))));
     return true;
   }
   /// @endcond
@@ -265,7 +265,7 @@ class ControlLoop {
         if (!detail::LaneAccess::step(observer_, measured, drive)) [[unlikely]]
           return step_seldom<true>(measured, drive, law);
         status_ = StepStatus::ok;
-        return limited(law(false));
+        return limited(actuated(law(false)));
       }
       return step_any<Advanced>(measured, drive, law);
     }
@@ -427,7 +427,7 @@ class ControlLoop {
       after_trouble(measured);
       return put_out(law);
     }
-    return limited(law(false));
+    return limited(actuated(law(false)));
   }
   template <bool Advanced, class Law>
   ESOKIT_COLD S step_seldom(S measured, S drive, Law law) noexcept {
@@ -442,7 +442,12 @@ class ControlLoop {
     }
     // Also where it is not used.
     if (!law.takes()) status_ = status_ | StepStatus::reference_rejected;
-    return limited(mode_ == LoopMode::running ? S(law(true)) : other_output());
+    return limited(mode_ == LoopMode::running ? actuated(law(true)) : other_output());
+  }
+
+  /// The u with the effect that a law asks for.
+  ESOKIT_INLINE detail::Turned<Observer, S> actuated(const S& effect) const noexcept {
+    return detail::input_for(observer_, effect);
   }
 
   ESOKIT_INLINE S limited(S wanted) noexcept {

@@ -104,9 +104,9 @@ requires(detail::goes_into_a_loop<Observer>()) class DisturbanceCompensator {
   /// missing.
   /// @param drive what drove the equation since the last sample in place of u, in units of y^(n) /
   /// b0
-  S update_driven(S y, S base_output, S drive) noexcept {
-    return loop_.step(y, drive, asked(base_output));
-  }
+  template <class O = Observer>
+  requires(!observer_traits<O>.maps_input) S update_driven(S y, S base_output, S drive)
+  noexcept { return loop_.step(y, drive, asked(base_output)); }
 
   /// w[k], before the sample in which it is first used; for an observer that is Measured.
   /// @param w a number, or a vector of several; NaN: lost
@@ -162,7 +162,7 @@ requires(detail::goes_into_a_loop<Observer>()) class DisturbanceCompensator {
 
   /// The u0 with which u would not change; limited to the range of the scalar.
   [[nodiscard]] S base_output() const noexcept {
-    return detail::clipped(loop_.output() - compensation());
+    return detail::clipped(S(detail::effect_of(observer(), loop_.output()) - compensation()));
   }
 
   /// The observer, for its estimates.

@@ -99,7 +99,7 @@ requires(detail::is_a_plain_scalar<S>()) class GainProbe {
     }
     S b = observer.input_gain();
     if constexpr (observer_traits<Observer>.schedules_input_gain) b = observer.present_input_gain();
-    add(b * observer.applied_input(), observer.total_disturbance());
+    add(b * detail::effect_of(observer, S(observer.applied_input())), observer.total_disturbance());
     if (finished()) return limiter_(controller.output());
     ++phase_;
     if (phase_ == half_samples_ / 2) late_step_ = step_;

@@ -298,7 +298,7 @@ requires(detail::is_a_plain_scalar<S>()) class HealthMonitor {
     if (observer.missed() == 0 && !rejected) average(innovation);
     lost_ = lost_ || rejected;
     free_ = free_ && runs && !gated;
-    phi_sum_ = phi_sum_ + b * observer.applied_input();
+    phi_sum_ = phi_sum_ + b * detail::effect_of(observer, S(observer.applied_input()));
     if (++phase_ < divider_) return;
     phase_ = 0;
     S phi = phi_sum_ / static_cast<S>(divider_);
@@ -321,7 +321,8 @@ requires(detail::is_a_plain_scalar<S>()) class HealthMonitor {
       forget();
       return;
     }
-    oppose(b * middle(controller.limiter()), psi, bounded, range, innovation);
+    oppose(b * detail::effect_of(observer, middle(controller.limiter())), psi, bounded, range,
+           innovation);
     regress(range, !bounded);
   }
 

@@ -75,6 +75,10 @@ requires(...&& detail::shifts_disturbance<Observers>()) class MimoAdrc {
   using InputMatrix = Matrix<S, channels, channels>;     ///< B0, q x q
   static_assert((std::is_same_v<typename Observers::scalar_type, S> && ...),
                 "esokit: all channels need the same scalar");
+  static_assert(
+      !(observer_traits<Observers>.maps_input || ...),
+      "esokit: MimoAdrc takes no MappedInput: its channels are not its actuators. Put the "
+      "u of ActuatorMap::input out, and tell `applied` the effect");
 
   /// What the controller can do beyond `update(y, reference)`.
   static constexpr ControllerTraits traits{.knows_sample_time = true};

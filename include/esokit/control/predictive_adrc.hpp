@@ -139,7 +139,7 @@ requires(detail::foretells<Observer>()) class PredictiveAdrc {
       if (!observer_.accepts(y)) [[unlikely]]
         raw = next_.blind;
     }
-    output_ = limiter_.clamp(select(usable(y, raw), raw, next_.blind));
+    output_ = limiter_.clamp(actuated(select(usable(y, raw), raw, next_.blind)));
     phase_ = Phase::measured;
     return output_;
   }
@@ -155,7 +155,7 @@ requires(detail::foretells<Observer>()) class PredictiveAdrc {
 
   /// First phase of a sample without a measurement.
   S control_without_measurement() noexcept {
-    output_ = limiter_.clamp(next_.blind);
+    output_ = limiter_.clamp(actuated(next_.blind));
     phase_ = Phase::missing;
     return output_;
   }
@@ -269,7 +269,9 @@ requires(detail::foretells<Observer>()) class PredictiveAdrc {
   /// Whether u is determined by the law, the start hold or the rule for missing measurements.
   [[nodiscard]] LoopMode mode() const noexcept { return mode_; }
   /// The next u if its measurement is missing, before the limits.
-  [[nodiscard]] const S& blind_output() const noexcept { return next_.blind; }
+  [[nodiscard]] detail::Turned<Observer, S> blind_output() const noexcept {
+    return actuated(next_.blind);
+  }
   /// k_0 .. k_(n-1).
   [[nodiscard]] const Array<S, order>& gains() const noexcept { return set_.law.gains(); }
 
@@ -328,6 +330,16 @@ requires(detail::foretells<Observer>()) class PredictiveAdrc {
     while (!all(detail::integer<S>(count) >= samples)) ++count;
     return count;
   }
+
+  /// The u with an effect, and back. What is `next_` and `wanted` are effects.
+  /// @{
+  [[nodiscard]] ESOKIT_INLINE detail::Turned<Observer, S> actuated(const S& effect) const noexcept {
+    return detail::input_for(observer_, effect);
+  }
+  [[nodiscard]] ESOKIT_INLINE detail::Turned<Observer, S> effect_of(const S& u) const noexcept {
+    return detail::effect_of(observer_, u);
+  }
+  /// @}
 
   /// u before the limits.
   [[nodiscard]] ESOKIT_INLINE S wanted(const S& y) const noexcept {
@@ -400,9 +412,9 @@ requires(detail::foretells<Observer>()) class PredictiveAdrc {
     }
     if (mode_ != LoopMode::running) [[unlikely]] {
       if (!all(is_finite(next_.feed))) status_ |= StepStatus::reference_rejected;
-      settle_for(mode_ == LoopMode::start_hold ? S(0.0)
-                 : set_.hold_safe              ? output_
-                                               : set_.safe_input);
+      settle_for(effect_of(mode_ == LoopMode::start_hold ? S(0.0)
+                           : set_.hold_safe              ? output_
+                                                         : set_.safe_input));
     }
     // If this is not finite, u would be NaN with a measurement, and a NaN passes the limits.
     if (!all(is_finite(next_.blind)) || !all(is_finite(next_.offset)) ||
@@ -440,7 +452,7 @@ requires(detail::foretells<Observer>()) class PredictiveAdrc {
     if constexpr (!records<S>) {
       if (!is_finite(next_.blind)) status_ |= StepStatus::reference_rejected;
     }
-    settle_for(select(is_finite(next_.blind), next_.blind, output_));
+    settle_for(select(is_finite(next_.blind), next_.blind, effect_of(output_)));
   }
 
   /// Which u is next: after the prediction, when a measurement that is missing counts as two.

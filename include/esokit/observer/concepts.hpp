@@ -20,6 +20,7 @@
 #include <esokit/core/scalar.hpp>
 #include <esokit/gain/gain_law.hpp>
 #include <esokit/gain/step_status.hpp>
+#include <type_traits>
 #include <utility>
 
 namespace esokit {
@@ -60,6 +61,10 @@ struct ObserverTraits {
 
   bool wraps_output = false;  ///< y is an angle: `wrap(difference) const`
   bool delays_input = false;  ///< u acts late: `fill_input(u)`, as if u had been applied for long
+
+  /// Its actuator has a curve: `effect_of(u) const` and its inverse `input_for(effect) const`, by
+  /// which a controller turns what its law asks for into a u, see MappedInput.
+  bool maps_input = false;
 
   /// Disturbances are measured: `measured(w)` before each step, `revise_measured()`,
   /// `settle_measured()`, see Measured.
@@ -151,6 +156,8 @@ concept TakesOneOrSeveral = requires(O& o, const typename O::scalar_type& s) {
   MISTAKEN(wraps)                                                                                 \
   HOOK(DelaysInput, delays_input, fill_input, o.fill_input(s);)                                   \
   MISTAKEN(fill_inputs)                                                                           \
+  HOOK(MapsInput, maps_input, input_for, { fixed.effect_of(s) } -> std::convertible_to<S>;        \
+       { fixed.input_for(s) } -> std::convertible_to<S>;)                                         \
   HOOK(TakesMeasured, takes_measured, revise_measured, o.revise_measured(); o.settle_measured();  \
        requires TakesOneOrSeveral<O>;)                                                            \
   HOOK(VariesTime, varies_time, set_step_time, { o.set_step_time(s) } -> std::same_as<Check<S>>;  \
@@ -272,6 +279,29 @@ concept ShiftableLoad = LoopObserver<O> && requires(O& observer, const typename 
 };
 
 namespace detail {
+
+/// The effect of a u, and the u with an effect, by the curve of an actuator; without one the same
+/// number, not even copied.
+/// @{
+template <class Observer, Scalar S>
+using Turned = std::conditional_t<observer_traits<Observer>.maps_input, S, const S&>;
+template <class Observer, Scalar S>
+ESOKIT_INLINE Turned<Observer, S> effect_of(const Observer& observer, const S& u) noexcept {
+  if constexpr (observer_traits<Observer>.maps_input) {
+    return observer.effect_of(u);
+  } else {
+    return u;
+  }
+}
+template <class Observer, Scalar S>
+ESOKIT_INLINE Turned<Observer, S> input_for(const Observer& observer, const S& effect) noexcept {
+  if constexpr (observer_traits<Observer>.maps_input) {
+    return observer.input_for(effect);
+  } else {
+    return effect;
+  }
+}
+/// @}
 
 /// The members that PredictiveAdrc needs for a kind of gain.
 template <class O, GainKind kind>
