@@ -332,7 +332,6 @@ class Filler {
     // Adapters.
     MEMBER(delay, member = tape_.integer(0, 4, text))
     MEMBER(period, number(text, member, {6, 7}))
-    MEMBER(curve, curve(member))
     if constexpr (requires { config.most_in_a_row; }) {
       if (!tape_.once_in(8, "no gate")) {
         number("threshold", config.threshold, {0.5, 5, true});
@@ -369,6 +368,12 @@ class Filler {
     }
     MEMBER(observer, fill(member))
     MEMBER(observers, fill(member))
+    MEMBER(curve, curve(member))
+    if constexpr (requires { config.curve, config.observer.leak_time; }) {
+      // The plant has no curve: there is something to leak, or that is beyond the bound.
+      const auto& guards = config.observer;
+      if (guards.leak_time > 0 || guards.disturbance_bound > 0) promise.certain = false;
+    }
     MEMBER(controller_bandwidths, number(text, member, {0.01 / T, 0.2 / T, true}))
     if constexpr (requires { config.controller_bandwidth, config.gains; }) {
       if (tape_.once_in(4, "by gains")) {

@@ -96,7 +96,9 @@ requires(detail::goes_into_a_loop<Observer>()) class MappedInput
 
   /// Members of the observer that are told or give a u.
   /// @{
-  [[nodiscard]] S applied_input() const noexcept { return input_for(observer_.applied_input()); }
+  [[nodiscard]] S applied_input() const noexcept {
+    return detail::clipped(input_for(observer_.applied_input()));
+  }
   [[nodiscard]] Estimate equilibrium(const S& y, const S& u) const noexcept {
     return observer_.equilibrium(y, effect_of(u));
   }

@@ -270,7 +270,11 @@ requires(detail::foretells<Observer>()) class PredictiveAdrc {
   [[nodiscard]] LoopMode mode() const noexcept { return mode_; }
   /// The next u if its measurement is missing, before the limits.
   [[nodiscard]] detail::Turned<Observer, S> blind_output() const noexcept {
-    return actuated(next_.blind);
+    if constexpr (observer_traits<Observer>.maps_input) {
+      return detail::clipped(actuated(next_.blind));
+    } else {
+      return next_.blind;
+    }
   }
   /// k_0 .. k_(n-1).
   [[nodiscard]] const Array<S, order>& gains() const noexcept { return set_.law.gains(); }
