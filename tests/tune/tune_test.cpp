@@ -529,7 +529,7 @@ TEST(TuneTest, EachFamilyIsAsGoodAsAGrid) {
   brute.cost = &cost;
   const double free = named(tuning, "LinearEso, free poles").cost;
   int compared = 0;
-  for (const auto& contender : esokit::detail::contenders<esokit::tune_knows_all>(model, false)) {
+  for (const auto& contender : esokit::detail::contenders(model, false)) {
     if (contender.observer_numbers + contender.law_numbers != 2) continue;
     brute.seen.clear();
     const auto value = [&](const std::vector<double>& x) { return brute.value(contender, x, 1e3); };
@@ -1409,30 +1409,6 @@ TEST(TuneTest, RefusesWhatIsNoProblem) {
               damping > 0.0 ? "pole_damping: must be below 0.7"
                             : "pole_damping: must be finite and not negative");
   }
-}
-
-TEST(TuneTest, HasOnlyThePartsThatItIsCompiledFor) {
-  constexpr auto of_lag = tune<esokit::TuneKnowledge{.lag = true}>;
-  constexpr auto of_chain = tune<esokit::TuneKnowledge{}>;
-  const TuneRules rules{.play = esokit::TunePlay::none};
-  TuneModel model = plain(1);
-  EXPECT_TRUE(of_chain(model, {}, rules));
-  model.lag = 0.02;
-  const auto found = of_lag(model, {}, rules).value().designs;
-  const auto all = tune(model, {}, rules).value().designs;
-  ASSERT_EQ(found.size(), all.size());
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    EXPECT_EQ(found[i].name, all[i].name);
-    EXPECT_EQ(found[i].cost, all[i].cost);
-  }
-  const auto refused = [](const auto& made) { return esokit_test::refusal(made); };
-  const std::string rule = "among the parts that this tune is compiled for";
-  EXPECT_EQ(refused(of_chain(model, {}, rules)), "lag: is not " + rule);
-  model.sensor = 0.004;
-  EXPECT_EQ(refused(of_lag(model, {}, rules)), "sensor: is not " + rule);
-  model.sensor = 0.0;
-  model.sinusoids = {{5.0, 1.0, 0.0}};
-  EXPECT_EQ(refused(of_lag(model, {}, rules)), "sinusoids: are not " + rule);
 }
 
 // Sizes with which nothing can be computed, each from both sides of its limit.

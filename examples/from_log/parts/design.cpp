@@ -20,9 +20,6 @@ using esokit::Identified;
 using esokit::LinearController;
 using esokit::Loop;
 
-/// A machine that identify finds has no other part that an observer could know.
-constexpr auto tune_found = esokit::tune<esokit::TuneKnowledge{.lag = true}>;
-
 /// f(the plant that was found).
 template <class F>
 auto with_plant(const Identified& found, F&& f) {
@@ -171,7 +168,7 @@ Design Design::make(const Settings& settings, const Input& input, const Findings
   wish.settling_time = settings.settling_time;
   wish.controller_bandwidth = settings.controller;
   if (settings.noise_share > 0.0) wish.control_noise = settings.noise_share * range;
-  auto tuning = tune_found(model, wish, settings.rules);
+  auto tuning = esokit::tune(model, wish, settings.rules);
   // A machine that settles sooner by itself need not be held back.
   std::string sooner;
   if (!tuning && std::string_view(tuning.error().field) == "settling_time" &&
@@ -182,7 +179,7 @@ Design Design::make(const Settings& settings, const Input& input, const Findings
         " s, so it cannot be asked of a feedback: the design is that without a wish. To move more "
         "slowly, let the reference move slowly.";
     wish.settling_time = 0.0;
-    tuning = tune_found(model, wish, settings.rules);
+    tuning = esokit::tune(model, wish, settings.rules);
   }
   if (!tuning) {
     const auto& error = tuning.error();

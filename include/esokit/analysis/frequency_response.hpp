@@ -5,9 +5,9 @@
 #include <cmath>
 #include <complex>
 #include <esokit/analysis/linear_system.hpp>
+#include <esokit/core/compiled.hpp>
 #include <esokit/math/dense.hpp>
 #include <numbers>
-#include <utility>
 
 namespace esokit {
 
@@ -15,12 +15,7 @@ namespace detail {
 
 /// Value of D at a frequency: i omega, or exp(i omega T) - 1 without cancellation.
 /// @param frequency rad/s @param sample_time s, 0: continuous
-inline std::complex<double> frequency_operator(double frequency, double sample_time) noexcept {
-  if (!(sample_time > 0.0)) return {0.0, frequency};
-  const double angle = frequency * sample_time;
-  const double half_sine = std::sin(0.5 * angle);
-  return {-2.0 * half_sine * half_sine, std::sin(angle)};
-}
+std::complex<double> frequency_operator(double frequency, double sample_time) noexcept;
 
 /// c (value I - a)^-1 b + d; not finite at a pole.
 template <int States, int Inputs, int Outputs>
@@ -51,39 +46,13 @@ EigenMatrix<std::complex<double>, Outputs, Inputs> evaluate(
 using ComplexMatrix = DynamicMatrix<std::complex<double>>;
 
 /// (value I - a)^-1 b.
-inline ComplexMatrix resolvent(const DynamicMatrix<double>& a, std::complex<double> value,
-                               ComplexMatrix b) {
-  ComplexMatrix pencil(a.rows(), a.rows());
-  for (int j = 0; j < a.rows(); ++j) {
-    for (int i = 0; i < a.rows(); ++i) pencil(i, j) = -a(i, j);
-    pencil(j, j) += value;
-  }
-  solve_in_place(pencil.view(), b.view());
-  return b;
-}
+ComplexMatrix resolvent(const DynamicMatrix<double>& a, std::complex<double> value,
+                        ComplexMatrix b);
 
 /// c x
-inline ComplexMatrix seen(const DynamicMatrix<double>& c, const ComplexMatrix& x) {
-  ComplexMatrix out(c.rows(), x.cols());
-  for (int j = 0; j < x.cols(); ++j) {
-    for (int k = 0; k < c.cols(); ++k) {
-      for (int i = 0; i < c.rows(); ++i) out(i, j) += c(i, k) * x(k, j);
-    }
-  }
-  return out;
-}
+ComplexMatrix seen(const DynamicMatrix<double>& c, const ComplexMatrix& x);
 
-inline ComplexMatrix evaluate(const DynamicSystem& system, std::complex<double> value) {
-  ComplexMatrix b(system.b.rows(), system.b.cols());
-  for (int j = 0; j < b.cols(); ++j) {
-    for (int i = 0; i < b.rows(); ++i) b(i, j) = system.b(i, j);
-  }
-  ComplexMatrix out = seen(system.c, resolvent(system.a, value, std::move(b)));
-  for (int j = 0; j < out.cols(); ++j) {
-    for (int i = 0; i < out.rows(); ++i) out(i, j) += system.d(i, j);
-  }
-  return out;
-}
+ComplexMatrix evaluate(const DynamicSystem& system, std::complex<double> value);
 
 template <class MatrixType>
 bool all_finite(const MatrixType& matrix) noexcept {
@@ -96,14 +65,7 @@ bool all_finite(const MatrixType& matrix) noexcept {
   return true;
 }
 
-inline Check<double> check_frequency(double frequency, double sample_time) {
-  const double nyquist = std::numbers::pi / sample_time;
-  return Rules<double>{}
-      .not_negative("frequency", frequency)
-      .demand(
-          !(sample_time > 0.0) || esokit::detail::at_most(frequency, nyquist),
-          {"frequency", frequency, "must not be above the Nyquist frequency", -1, nyquist, true});
-}
+Check<double> check_frequency(double frequency, double sample_time);
 
 }  // namespace detail
 
@@ -125,16 +87,8 @@ Expected<EigenMatrix<std::complex<double>, Outputs, Inputs>, Error<double>> freq
 }
 
 /// The same for a system whose sizes are known at run time.
-inline Expected<DynamicMatrix<std::complex<double>>, Error<double>> frequency_response(
-    const DynamicSystem& system, double frequency) {
-  if (auto ok = detail::check_frequency(frequency, system.sample_time); !ok) return ok.error();
-  auto response =
-      detail::evaluate(system, detail::frequency_operator(frequency, system.sample_time));
-  if (!detail::all_finite(response)) {
-    return Error<double>{"frequency", frequency, "is a pole of the system"};
-  }
-  return response;
-}
+Expected<DynamicMatrix<std::complex<double>>, Error<double>> frequency_response(
+    const DynamicSystem& system, double frequency);
 
 /// `Count` frequencies from `from` to `to`, evenly spaced in their logarithm, both ends included.
 /// @param from, to rad/s, 0 < from < to
@@ -194,3 +148,7 @@ Expected<Bode<static_cast<int>(Count)>, Error<double>> bode(
 }
 
 }  // namespace esokit
+
+#if defined(ESOKIT_HEADER_ONLY)
+#include <esokit/analysis/impl/frequency_response.ipp>
+#endif

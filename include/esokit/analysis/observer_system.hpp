@@ -6,11 +6,11 @@
 /// computed by calling `derivative` with unit vectors, each entry being a single product.
 #pragma once
 
-#include <cmath>
 #include <concepts>
 #include <cstddef>
 #include <esokit/analysis/integrator_chain.hpp>
 #include <esokit/analysis/linear_system.hpp>
+#include <esokit/core/compiled.hpp>
 #include <esokit/gain/sampled_gain.hpp>
 #include <esokit/model/chain_model.hpp>
 #include <esokit/model/sampled_model.hpp>
@@ -187,61 +187,9 @@ struct ObserverParts {
 
 /// Computes ObserverMatrices of any size; the results must be zero at first. `work` has two more
 /// columns than states.
-inline void put_together(const ObserverSizes& sizes, const ObserverParts& parts,
-                         DenseView<double> work, DenseView<double> a, DenseView<double> by,
-                         DenseView<double> bu, DenseView<double> c, DenseView<double> dy) {
-  const auto [size, levels] = sizes;
-  const int states = size * levels;
-  // The correction of each level, as rows over the predicted states and y.
-  const DenseView<double> added{work.data, states, states};
-  double* const added_y = &work(0, states);
-  double* const measured = &work(0, states + 1);
-  double measured_y = 1.0;
-  for (int level = 0; level < levels; ++level) {
-    const int first = level * size;
-    for (int r = 0; r < size; ++r) {
-      const double gain = parts.gains[first + r];
-      for (int j = 0; j < states; ++j) {
-        const double innovation = measured[j] - (j == first ? 1.0 : 0.0);
-        added(first + r, j) = gain * innovation;
-      }
-      added_y[first + r] = gain * measured_y;
-    }
-    if (level > 0) {  // plus the corrections of the disturbance by the levels before
-      for (int r = 0; r < size; ++r) {
-        for (int q = 0; q < size; ++q) {
-          const double share = parts.disturbance(r, q);
-          if (!((std::abs)(share) > 0.0)) continue;
-          for (int j = 0; j < states; ++j) {
-            added(first + r, j) += share * added(first - size + q, j);
-          }
-          added_y[first + r] += share * added_y[first - size + q];
-        }
-      }
-    }
-    for (int j = 0; j < states; ++j) {
-      measured[j] = added(first, j) + (j == first ? 1.0 : 0.0);
-    }
-    measured_y = added_y[first];
-  }
-
-  for (int row = 0; row < states; ++row) {
-    const int first = row / size * size;
-    for (int k = first; k < first + size; ++k) {
-      const double step = parts.step(row - first, k - first);
-      const double weight = step + (k == row ? 1.0 : 0.0);
-      for (int j = 0; j < states; ++j) a(row, j) += weight * added(k, j);
-      a(row, k) += step;
-      by(row, 0) += weight * added_y[k];
-    }
-    bu(row, 0) = parts.gamma(row - first, 0);
-  }
-  for (int r = 0; r < size; ++r) {
-    const int row = states - size + parts.state_of_row[r];
-    for (int j = 0; j < states; ++j) c(r, j) = added(row, j) + (j == row ? 1.0 : 0.0);
-    dy(r, 0) = added_y[row];
-  }
-}
+void put_together(const ObserverSizes& sizes, const ObserverParts& parts, DenseView<double> work,
+                  DenseView<double> a, DenseView<double> by, DenseView<double> bu,
+                  DenseView<double> c, DenseView<double> dy);
 
 template <class Observer>
 using MatricesOf = ObserverMatrices<Observer::order, Observer::extension, Observer::levels>;
@@ -413,3 +361,7 @@ auto error_system(const Observer& observer, double t = 0.0) {
 }
 
 }  // namespace esokit
+
+#if defined(ESOKIT_HEADER_ONLY)
+#include <esokit/analysis/impl/observer_system.ipp>
+#endif

@@ -4,6 +4,23 @@
 #define ESOKIT_COMPILED
 #endif
 
+#include <esokit/analysis/impl/covariance.ipp>
+#include <esokit/analysis/impl/delay_margin.ipp>
+#include <esokit/analysis/impl/eigenvalues.ipp>
+#include <esokit/analysis/impl/frequency_response.ipp>
+#include <esokit/analysis/impl/linear_controller.ipp>
+#include <esokit/analysis/impl/linear_system.ipp>
+#include <esokit/analysis/impl/loop.ipp>
+#include <esokit/analysis/impl/loop_noise.ipp>
+#include <esokit/analysis/impl/loop_response.ipp>
+#include <esokit/analysis/impl/loop_scan.ipp>
+#include <esokit/analysis/impl/lyapunov.ipp>
+#include <esokit/analysis/impl/lyapunov_matrix.ipp>
+#include <esokit/analysis/impl/margins.ipp>
+#include <esokit/analysis/impl/observer_system.ipp>
+#include <esokit/analysis/impl/peak_gain.ipp>
+#include <esokit/analysis/impl/poles.ipp>
+#include <esokit/analysis/impl/worst_case.ipp>
 #include <esokit/identify/impl/fit.ipp>
 #include <esokit/identify/impl/gain_evidence.ipp>
 #include <esokit/identify/impl/identified.ipp>
@@ -19,3 +36,14 @@
 #include <esokit/identify/impl/sinusoids.ipp>
 #include <esokit/identify/impl/spectrum.ipp>
 #include <esokit/identify/impl/timed_column.ipp>
+#include <esokit/tune/impl/controller_source.ipp>
+#include <esokit/tune/impl/families.ipp>
+#include <esokit/tune/impl/loop_cost.ipp>
+#include <esokit/tune/impl/lqg.ipp>
+#include <esokit/tune/impl/plain_pid.ipp>
+#include <esokit/tune/impl/play.ipp>
+#include <esokit/tune/impl/problem.ipp>
+#include <esokit/tune/impl/rivals.ipp>
+#include <esokit/tune/impl/tune.ipp>
+#include <esokit/tune/impl/tune_search.ipp>
+#include <esokit/tune/impl/tuning.ipp>

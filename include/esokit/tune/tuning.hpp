@@ -2,9 +2,8 @@
 /// Tuning: the designs of `tune` with their numbers, and what speaks against them.
 #pragma once
 
-#include <cstddef>
-#include <cstdio>
 #include <esokit/analysis/controllers.hpp>
+#include <esokit/core/compiled.hpp>
 #include <esokit/tune/families.hpp>
 #include <esokit/tune/loop_cost.hpp>
 #include <esokit/tune/play.hpp>
@@ -55,11 +54,7 @@ struct TunedDesign {
   [[nodiscard]] PlayedLaw played_law() const { return settings.soften ? law : PlayedLaw{}; }
   /// The settling time for `play` on one of `played_variants`, s: with friction 32 / omega_c of a
   /// law.
-  [[nodiscard]] double played_settling(const TuneModel& variant) const {
-    return variant.friction.value_or(0.0) > 0.0 && !settings.gains.empty()
-               ? 32.0 / detail::law_mean(settings.gains, variant.order)
-               : settling_time;
-  }
+  [[nodiscard]] double played_settling(const TuneModel& variant) const;
 };
 
 /// The result of `tune`.
@@ -77,11 +72,7 @@ struct Tuning {
                                        ///< played, infeasible ones last
 
   /// The first design, or null if it does not keep the rules or does not come back.
-  [[nodiscard]] const TunedDesign* chosen() const noexcept {
-    return !designs.empty() && designs.front().feasible && designs.front().comes_back
-               ? &designs.front()
-               : nullptr;
-  }
+  [[nodiscard]] const TunedDesign* chosen() const noexcept;
 };
 
 /// Something that has to be looked at before a design is used.
@@ -93,62 +84,14 @@ struct TuneAlarm {
 /// What speaks against a design that keeps its rules: a settling time above the one asked, noise in
 /// u above usual_control_noise, more than three times the deviations of the best linear controller,
 /// and what it does not come back from, or that nothing was played.
-inline std::vector<TuneAlarm> alarms(const Tuning& tuning, const TunedDesign& design) {
-  std::vector<TuneAlarm> all;
-  const double range = tuning.model.u_max - tuning.model.u_min;
-  const auto number = [](double value) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.3g", value);
-    return std::string(text);
-  };
-  if (!design.comes_back) {
-    all.push_back(
-        {"overload", "This design does not come back from " + design.lost +
-                         ": u goes from limit to limit or stays at one, or y swings for ever."});
-  } else if (!design.played) {
-    all.push_back({"overload",
-                   "This design was not played within the limits of u: whether it "
-                   "comes back from an overload is not known."});
-  }
-  if (tuning.settling_time > 0.0 && design.settling_time > 1.05 * tuning.settling_time) {
-    all.push_back(
-        {"settling",
-         "A step of the reference settles in " + number(design.settling_time) + " s, asked was " +
-             number(tuning.settling_time) +
-             " s: its slowest poles are those of the observer, or the rules allow no faster law."});
-  }
-  if (design.control_noise > 1.001 * usual_control_noise * range) {
-    all.push_back({"noise", "Noise moves u by " + number(100.0 * design.control_noise / range) +
-                                " % of its range (standard deviation); usual is " +
-                                number(100.0 * usual_control_noise) +
-                                " %. The least that cancels the disturbance of the log is " +
-                                number(100.0 * tuning.least_noise / range) +
-                                " %. Measure y with less noise, or sample faster."});
-  }
-  if (design.excess > 3.0) {
-    all.push_back({"excess", "Deviations of y and u are " + number(design.excess) +
-                                 " times those of the best linear controller: the rules leave "
-                                 "little of what this machine could do. It is limited by: " +
-                                 design.constraint + "."});
-  }
-  return all;
-}
+std::vector<TuneAlarm> alarms(const Tuning& tuning, const TunedDesign& design);
 
 /// Operations of an update of the observer: additions, products, comparisons and the like in its
 /// recorded list, of which the C of `target` consists. A test compares the two.
-inline int update_operations(int order, int extension, int levels, const TuneKnowledge& knows) {
-  const auto n = static_cast<std::size_t>(order - 1);
-  constexpr int chain[4] = {13, 21, 30, 41};
-  constexpr int cascade[3][2] = {{26, 37}, {42, 60}, {60, 86}};
-  constexpr int lag[3] = {24, 34, 45}, sensor[3] = {23, 33, 44}, sinusoid[3] = {35, 47, 60};
-  constexpr int lag_sensor[3] = {36, 48, 61}, lag_sinusoid[3] = {52, 66, 81};
-  if (knows.lag && knows.sensor) return lag_sensor[n];
-  if (knows.lag && knows.sinusoid) return lag_sinusoid[n];
-  if (knows.lag) return lag[n];
-  if (knows.sensor) return sensor[n];
-  if (knows.sinusoid) return sinusoid[n];
-  if (levels > 1) return cascade[n][static_cast<std::size_t>(levels - 2)];
-  return chain[n + static_cast<std::size_t>(extension - 1)];
-}
+int update_operations(int order, int extension, int levels, const TuneKnowledge& knows);
 
 }  // namespace esokit
+
+#if defined(ESOKIT_HEADER_ONLY)
+#include <esokit/tune/impl/tuning.ipp>
+#endif

@@ -1,0 +1,136 @@
+#pragma once
+
+#include <complex>
+#include <cstddef>
+#include <cstdio>
+#include <cstdlib>
+#include <esokit/tune/controller_source.hpp>
+#include <esokit/tune/families.hpp>
+#include <esokit/tune/problem.hpp>
+#include <esokit/tune/tuning.hpp>
+#include <string>
+#include <vector>
+
+namespace esokit {
+
+namespace detail {
+
+ESOKIT_FUNCTION std::string source(double value) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.6g", value);
+  std::string number = text;
+  if (number.find_first_of(".en") == std::string::npos) number += ".0";
+  return number;
+}
+
+ESOKIT_FUNCTION double printed(double value) { return std::strtod(source(value).c_str(), nullptr); }
+
+ESOKIT_FUNCTION TuneSettings as_printed(TuneSettings s) {
+  for (double* number :
+       {&s.observer_bandwidth, &s.bandwidth_factor, &s.disturbance_bound, &s.capture_bandwidth}) {
+    *number = printed(*number);
+  }
+  for (auto& pole : s.observer_poles) pole = {printed(pole.real()), printed(pole.imag())};
+  if (s.controller_bandwidth > 0.0) {
+    s.controller_bandwidth = printed(s.controller_bandwidth);
+    s.gains =
+        polynomial(std::vector<std::complex<double>>(s.gains.size(), -s.controller_bandwidth));
+  } else {
+    for (double& gain : s.gains) gain = printed(gain);
+  }
+  return s;
+}
+
+ESOKIT_FUNCTION std::string ControllerSource::text(const TuneModel& model) const {
+  return "using Observer = " + observer + ";\n" +
+         "auto controller = esokit::Adrc<Observer>::make({.observer = {" + config + "},\n    " +
+         law + ",\n    .limits = {.lower = " + source(model.u_min) +
+         ", .upper = " + source(model.u_max) +
+         "},\n    .missing = {.input = " + source(model.safe_input()) +
+         "},  // u if y stays away: choose\n    " + soften + "});\n";
+}
+
+ESOKIT_FUNCTION ControllerSource controller_source(const TunedDesign& d, const TuneModel& model) {
+  const std::string n = std::to_string(model.order);
+  const auto list = [](const std::vector<double>& numbers) {
+    std::string text;
+    for (const double number : numbers) text += (text.empty() ? "" : ", ") + source(number);
+    return text;
+  };
+  const auto poles = [&](std::string text) {
+    for (const auto& p : d.settings.observer_poles) {
+      text += (text.empty() ? "{" : ", {") + source(p.real()) + ", " + source(p.imag()) + "}";
+    }
+    return ".poles = {{" + text + "}}";
+  };
+  std::string type, config;
+  if (d.knows.any()) {
+    type = "esokit::ModelEso<esokit::ModelParts{.order = " + n;
+    std::string parts;
+    const auto part = [&](const std::string& text) { parts += (parts.empty() ? "" : ", ") + text; };
+    if (d.knows.lag) {
+      type += ", .actuator = 1";
+      part(".actuator = {.time_constant = " + source(model.lag) + "}");
+    }
+    if (d.knows.sensor) {
+      type += ", .sensor = 1";
+      part(".sensor = {.time_constant = " + source(model.sensor) + "}");
+    }
+    if (d.knows.sinusoid) {
+      type += ", .resonators = 1";
+      part(".resonators = {{{.frequency = " + source(model.sinusoids.front().frequency) +
+           ", .capture_bandwidth = " + source(d.settings.capture_bandwidth) + "}}}");
+    }
+    const bool free = d.family == TuneFamily::free_poles;
+    type += d.family == TuneFamily::half_gain ? "}, double, esokit::HalfGainPoles>"
+            : free                            ? "}, double, esokit::PoleSet>"
+                                              : "}>";
+    // The pole of the lag is kept.
+    config = free ? poles("{-1.0 / " + source(model.lag) + ", 0.0}")
+                  : ".observer_bandwidth = " + source(d.settings.observer_bandwidth);
+    config += ", .input_gain = " + source(model.input_gain.value) +
+              ", .sample_time = " + source(model.sample_time) + ", .model = {" + parts + "}";
+  } else {
+    const std::string common = ".input_gain = " + source(model.input_gain.value) +
+                               ", .sample_time = " + source(model.sample_time);
+    const std::string bandwidth =
+        ".observer_bandwidth = " + source(d.settings.observer_bandwidth) + ", ";
+    switch (d.family) {
+      case TuneFamily::linear:
+        type = "esokit::LinearEso<" + n + (d.extension > 1 ? ", double, 2>" : ">");
+        config = bandwidth + common;
+        break;
+      case TuneFamily::half_gain:
+        type = "esokit::HalfGainEso<" + n + ">";
+        config = bandwidth + common;
+        break;
+      case TuneFamily::cascade:
+        type = "esokit::CascadeEso<" + n + ", " + std::to_string(d.levels) + ">";
+        config = bandwidth + ".bandwidth_factor = " + source(d.settings.bandwidth_factor) + ", " +
+                 common;
+        break;
+      case TuneFamily::filter: {
+        type = "esokit::ExtendedStateFilter<" + n + ">";
+        std::vector<double> bounds(static_cast<std::size_t>(model.order), 0.0);
+        bounds.push_back(d.settings.disturbance_bound);
+        config = common + ", .measurement_variance = " + source(model.noise) + " * " +
+                 source(model.noise) + ", .disturbance_bounds = {{" + list(bounds) +
+                 "}}, .bound_factor = 1.0, .inflation_rule = esokit::InflationRule::none, "
+                 ".mode = esokit::RiccatiMode::frozen";
+        break;
+      }
+      case TuneFamily::free_poles:
+        type = "esokit::LinearEso<" + n + ", double, 1, esokit::PoleSet>";
+        config = poles("") + ", " + common;
+        break;
+    }
+  }
+  return {type, config,
+          d.settings.controller_bandwidth > 0.0
+              ? ".controller_bandwidth = " + source(d.settings.controller_bandwidth)
+              : ".gains = {{" + list(d.settings.gains) + "}}",
+          std::string(".soften = ") + (d.settings.soften ? "true" : "false")};
+}
+
+}  // namespace detail
+}  // namespace esokit
