@@ -202,7 +202,6 @@
 #include <esokit/target/fixed_options.hpp>
 #include <esokit/target/fixed_point.hpp>
 #include <esokit/target/fixed_record.hpp>
-#include <esokit/target/fixed_text.hpp>
 #include <esokit/target/health_code.hpp>
 #include <esokit/target/integer_list.hpp>
 #include <esokit/target/linear_call.hpp>

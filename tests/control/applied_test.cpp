@@ -117,6 +117,11 @@ class Any {
       c_.start(y, u);
     }
   }
+  void retune(const Setting<S>& setting) {
+    typename C::Config config{};
+    fill(config, setting);
+    EXPECT_TRUE(c_.retune(config));
+  }
   [[nodiscard]] S output() const {
     if constexpr (several) {
       return c_.output()(0);
@@ -267,6 +272,28 @@ TYPED_TEST(Applied, StartGoesOnFromTheOperatorsInput) {
     // From then on it is a report.
     c.applied(S(0));
     EXPECT_EQ(c.output(), u);
+  }
+}
+
+/// The last command is what was put out, whatever the law asked for: wider limits do not move it.
+TYPED_TEST(Applied, ARetuneKeepsTheLastCommand) {
+  using S = typename TypeParam::scalar_type;
+  for (const S rate : {S(1e5), Limits<S>{}.rate}) {
+    Setting<S> setting;
+    setting.limits = {S(-2), S(2), rate};
+    Any<TypeParam> c(setting);
+    for (int k = 0; k < 10; ++k) {
+      c.update(S(0), S(1e4));
+      c.end_of_sample(S(1e4));
+    }
+    ASSERT_EQ(c.output(), S(2));
+    c.applied(S(1));
+    setting.limits = {S(-9), S(9), rate};
+    c.retune(setting);
+    EXPECT_EQ(c.output(), S(2));
+    setting.limits = {S(-9), S(1.5), rate};
+    c.retune(setting);
+    EXPECT_EQ(c.update(S(0), S(1e4)), S(1.5));
   }
 }
 

@@ -128,8 +128,8 @@ TEST(CKnown, RefusesASoftenedLawOfAnAngle) {
 
 TEST(CKnown, AdoptsSettings) {
   if (!there("gcc")) GTEST_SKIP() << "no gcc";
-  adopts<Adrc<Known<LinearEso<2, double>>>>(1201);
-  adopts<DisturbanceCompensator<Known<LinearEso<2, float>, Odd>>>(1211);
+  adopts<Adrc<Known<LinearEso<2, double>>>>(1201, true);
+  adopts<DisturbanceCompensator<Known<LinearEso<2, float>, Odd>>>(1211, false);
 }
 
 #endif

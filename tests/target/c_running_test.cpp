@@ -140,10 +140,10 @@ TEST(CRunning, RefusesBadNumbersUnderFastMath) {
 
 TEST(CRunning, AdoptsSettings) {
   if (!there("gcc")) GTEST_SKIP() << "no gcc";
-  adopts<Adrc<LinearEso<2, double>>>(701);
-  adopts<Adrc<CascadeEso<1, 2, float>>>(711);
-  adopts<Adrc<OutlierGate<ModelEso<lag, double>>>>(721);
-  adopts<DisturbanceCompensator<LinearEso<1, float>>>(731);
+  adopts<Adrc<LinearEso<2, double>>>(701, true);
+  adopts<Adrc<CascadeEso<1, 2, float>>>(711, false);
+  adopts<Adrc<OutlierGate<ModelEso<lag, double>>>>(721, true);
+  adopts<DisturbanceCompensator<LinearEso<1, float>>>(731, false);
   using Switched = AlgebraicEso<1, double>;
   const auto refused =
       to_c(Switched::make(observer_config<Switched>(8)).value(), {.settings_in_struct = true});

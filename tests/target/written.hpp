@@ -699,16 +699,18 @@ void refuses_under_fast_math(bool silent = false) {
   }
 }
 
-/// Other settings while it runs, as by `adopt`.
+/// Other settings while it runs, as by `adopt`. @param is_slow whether there is a limit of rate
 template <class C>
-void adopts(std::uint64_t seed) {
+void adopts(std::uint64_t seed, bool is_slow) {
   SCOPED_TRACE(testing::internal::GetTypeName<C>());
   using V = typename C::scalar_type;
   auto settings = config<C>(8);
+  const V rate = is_slow ? V(60) : esokit::Limits<V>{}.rate;
+  settings.limits.rate = rate;
   const C first = C::make(settings).value();
   innermost(settings).observer_bandwidth = V(20);
   if constexpr (requires { settings.controller_bandwidth; }) settings.controller_bandwidth = V(3);
-  settings.limits = {V(-1), V(1.5), V(60)};
+  settings.limits = {V(-1), V(1.5), rate};
   const C second = C::make(settings).value();
   settings.missing.most = 3;  // not one of the settings
   const C third = C::make(settings).value();
@@ -729,6 +731,7 @@ void adopts(std::uint64_t seed) {
   V (*update)(void*, V, V) = nullptr;
   V (*estimate)(const void*, unsigned) = nullptr;
   bool (*adopt)(void*, const void*) = nullptr;
+  unsigned (*applied)(void*, V) = nullptr;
   int (*self_test)(V) = nullptr;
   unsigned (*size)() = nullptr;
   const void* sets[3] = {};
@@ -736,6 +739,7 @@ void adopts(std::uint64_t seed) {
   library.find(update, "loop_update");
   library.find(estimate, "loop_estimate");
   library.find(adopt, "loop_adopt");
+  library.find(applied, "loop_applied");
   library.find(self_test, "loop_self_test");
   library.find(size, "loop_size");
   library.find(sets[0], "loop_design");
@@ -754,7 +758,12 @@ void adopts(std::uint64_t seed) {
     if (random.index(60) == 0) r = static_cast<V>(random.uniform(-4, 4));
     V y = static_cast<V>(plant.output() + 1e-3 * random.uniform(-1, 1));
     if (random.index(20) == 0) y = random.index(2) == 0 ? hidden_nan<V>() : anything<V>(random);
-    const int set = random.index(300);
+    if (random.index(10) == 0) {
+      const V told = random.index(2) == 0 ? static_cast<V>(random.uniform(-5, 5)) : mine.output();
+      EXPECT_EQ(applied(state.data(), told), 0u);
+      (void)mine.applied(told);
+    }
+    const int set = random.index(100);
     if (set < 2) {
       EXPECT_TRUE(mine.adopt(set == 0 ? first : second));
       EXPECT_TRUE(adopt(state.data(), sets[set]));
@@ -764,6 +773,7 @@ void adopts(std::uint64_t seed) {
     }
     V given = r;
     if constexpr (!requires { mine.gains(); }) given = (r - y) / V(8);
+    if (random.index(20) == 0 || set < 2) given = hidden_nan<V>();
     const V u = mine.update(y, given);
     EXPECT_TRUE(equal_bits(u, update(state.data(), y, given))) << "sample " << k;
     detail::unroll<std::remove_cvref_t<decltype(mine.observer())>::size>([&](auto row) {

@@ -317,8 +317,8 @@ class ControlLoop {
   /// them, nothing changes.
   Check<S> adopt(const ControlLoop& fresh) {
     if (auto ok = observer_.adopt(fresh.observer_); !ok) return ok;
-    limiter_.adopt(fresh.limiter_, output());
     requested_ = output();
+    limiter_.adopt(fresh.limiter_, requested_);
     // After a change of the divider the next update is one with a measurement.
     if (set_.divider != fresh.set_.divider) phase_ = 0;
     set_ = fresh.set_;
@@ -536,13 +536,13 @@ class ControlLoop {
   // side: a bank of packs waits for memory. The padding of an object holds what is next.
   [[no_unique_address]] Set set_;
   Lanes<LoopMode, S> mode_;
-  Lanes<std::uint16_t, S> phase_{};
-  Lanes<bool, S> elsewhere_{false};  ///< u was commanded by something else since the last step
   Lanes<std::uint32_t, S> hold_left_;
   [[no_unique_address]] Limiter<S> limiter_;
-  StatusType status_ = StepStatus::ok;
+  Lanes<std::uint16_t, S> phase_{};
+  Lanes<bool, S> elsewhere_{false};  ///< u was commanded by something else since the last step
   /// True if anything besides the law has to be done: one test in the hot path.
   Lanes<bool, S> special_{false};
+  StatusType status_ = StepStatus::ok;
   S requested_{};
   Observer observer_;
 };

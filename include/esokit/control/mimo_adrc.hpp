@@ -111,14 +111,14 @@ requires(...&& detail::shifts_disturbance<Observers>()) class MimoAdrc {
       S r = reference(row);
       if constexpr (observer_traits<ObserverOf<row>>.wraps_output)
         r = estimate(0) + observer.wrap(r - estimate(0));
-      const S v =
+      wanted(row) =
           detail::by_present_gain(observer, S(std::get<channel>(laws_).control(estimate, r)));
-      wanted(row) = is_finite(v) ? v : kept(row);
     });
-    wanted = inverse_ * wanted;
-    if (special_ != 0) [[unlikely]]
-      wanted = specially(wanted);
-    return put_out(wanted);
+    Output u = inverse_ * wanted;
+    if (special_ != 0 || !is_finite(u.sum())) [[unlikely]]
+      u = specially(wanted);
+    for (int i = 0; i < channels; ++i) u(i) = limiters_[static_cast<std::size_t>(i)](u(i));
+    return u;
   }
 
   /// What the actuators held since the last sample, if it was not the last output: say it before
@@ -332,13 +332,8 @@ requires(...&& detail::shifts_disturbance<Observers>()) class MimoAdrc {
     if (observer.missed() > rule.most) special_ |= safe;
   }
 
-  /// What a channel keeps of B0 u if its law is not finite.
-  ESOKIT_COLD S kept(int row) noexcept {
-    statuses_[static_cast<std::size_t>(row)] |= StepStatus::reference_rejected;
-    return S((input_matrix_ * output())(row));
-  }
-
-  /// u where it is not the last output that the actuators held, or measurements are missing.
+  /// u where a law or u is not finite, where it is not the last output that the actuators held, or
+  /// where measurements are missing. @param wanted of the laws
   ESOKIT_COLD Output specially(Output wanted) noexcept {
     bool stays = false;
     for (const Missing& rule : missing_) stays = stays || rule.stay;
@@ -348,14 +343,20 @@ requires(...&& detail::shifts_disturbance<Observers>()) class MimoAdrc {
     if (!stays) special_ &= static_cast<unsigned char>(~safe);
     const Output before = output();
     for (int i = 0; i < channels; ++i) {
+      if (is_finite(wanted(i))) continue;
+      statuses_[static_cast<std::size_t>(i)] |= StepStatus::reference_rejected;
+      wanted(i) = (input_matrix_ * before)(i);
+    }
+    Output u = inverse_ * wanted;
+    for (int i = 0; i < channels; ++i) {
       if ((special_ & safe) != 0) {
-        wanted(i) = missing_[static_cast<std::size_t>(i)].hold ? before(i) : safe_input_(i);
-      } else if (!is_finite(wanted(i))) {
-        wanted(i) = before(i);
+        u(i) = missing_[static_cast<std::size_t>(i)].hold ? before(i) : safe_input_(i);
+      } else if (!is_finite(u(i))) {
+        u(i) = before(i);
       }
     }
     special_ &= safe;
-    return wanted;
+    return u;
   }
 
   [[nodiscard]] bool is_told() const noexcept { return (special_ & told) != 0; }
@@ -373,16 +374,6 @@ requires(...&& detail::shifts_disturbance<Observers>()) class MimoAdrc {
   static Error<S> too_large(const S& u) {
     return {"input_matrix", u,
             "turns the present u (the value here) into a disturbance that the scalar cannot hold"};
-  }
-
-  Output put_out(const Output& wanted) noexcept {
-    Output u;
-    for (int i = 0; i < channels; ++i) {
-      auto& limiter = limiters_[static_cast<std::size_t>(i)];
-      // On overflow the last output is kept.
-      u(i) = limiter(is_finite(wanted(i)) ? wanted(i) : limiter.last());
-    }
-    return u;
   }
 
   static Expected<InputMatrix, Error<S>> inverted(const InputMatrix& input_matrix,

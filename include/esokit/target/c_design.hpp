@@ -199,8 +199,7 @@ class CDesign {
     text_.feature("ESOKIT_HOLDS_AT_START", holds);
     text_.constant("FIRST_MODE", holds ? "1u" : "0u");
     text_.constant("FIRST_PHASE", d.loop.elsewhere ? "5u" : "0u");
-    text_.count("FIRST_SPECIAL", static_cast<std::size_t>((holds ? 1 : 0) + (d.loop.told ? 2 : 0) +
-                                                          (d.loop.elsewhere ? 4 : 0)));
+    text_.constant("FIRST_ELSEWHERE", d.loop.elsewhere ? "1u" : "0u");
     number("FIRST_KEPT", d.loop.kept);
     number("HOLD_INPUT", d.loop.hold_input);
     number("SAFE_INPUT", d.loop.safe_input);

@@ -75,7 +75,6 @@ struct RecordAccess {
   }
   template <class Loop>
   static LoopRules rules(const Loop& loop) noexcept {
-    const bool told = loop.held() < loop.output() || loop.held() > loop.output();
     return {loop.hold_left_,
             loop.set_.missing_limit,
             loop.set_.divider,
@@ -84,7 +83,6 @@ struct RecordAccess {
             static_cast<double>(loop.set_.hold_input),
             static_cast<double>(loop.set_.safe_input),
             loop.elsewhere_,
-            told && !loop.elsewhere_,
             static_cast<double>(loop.output())};
   }
 

@@ -42,8 +42,7 @@ struct LoopRules {
   double hold_input = 0;
   double safe_input = 0;
   bool elsewhere = false;  ///< the last u was commanded by something else
-  bool told = false;       ///< the actuator holds another than the last, which is
-  double kept = 0;
+  double kept = 0;         ///< the last u, if the actuator holds another, too
 };
 
 /// An OutlierGate: its settings, and what it has seen.

@@ -38,7 +38,7 @@ def valid(has):
     return not (
         (not loop and has & set(OF_LOOPS) - {"MONITORED"} -
          ({"STAYS_SAFE", "HOLDS_SAFE"} if "PREDICTIVE" in has else set()))
-        or ("HOLDS_AT_START" in has and "PREDICTIVE" not in has)
+        or ("HOLDS_AT_START" in has and not loop and "PREDICTIVE" not in has)
         or ("PREDICTIVE" in has and (has & {"DELAYED", "GATED", "WRAPPED", "KNOWN", "MEASURED", "GUARDED",
                                             "SETTINGS"} or ("TABLE" in has and not kept)))
         or ("GUARDED" in has and (not kept or "MEASURED" in has))

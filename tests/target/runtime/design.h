@@ -90,7 +90,7 @@ typedef double real;
 #define HOLD_SAMPLES 13u
 #define FIRST_MODE 1u
 #define FIRST_PHASE 0u
-#define FIRST_SPECIAL 1u
+#define FIRST_ELSEWHERE 1u
 #define FIRST_KEPT number(0.25)
 #define HOLD_INPUT number(0.5)
 #define SAFE_INPUT number(0.5)

@@ -19,25 +19,27 @@ R"esokit("
 #endif
 #endif
 #if ESOKIT_CONTROLLER
-/* Bits of `special`. */
-#define OTHER_MODE 1u
-#define TOLD 2u /* u_last is what was reported */
-#define ELSEWHERE 4u /* u was commanded by something else */
-#define IN_TROUBLE 8u /* this sample */
-
-/* The last u, as it was commanded. */
+/* The last u of update, or what was commanded elsewhere since. */
 static real commanded(const esokit_state *o)
 {
-  real u = ((o->special & TOLD) != 0u) ? o->u_kept : o->u_last;
-  (void)within(o, u, &u);
+  real u = o->u_kept;
+#if ESOKIT_GUARDED || ESOKIT_MONITORED || ESOKIT_SETTINGS
+  (void)within(o, u, &u); /* else put_out sees to it */
+#endif
   return u;
+}
+
+/* u is commanded elsewhere. */
+static void take_command(esokit_state *o, real u)
+{
+  (void)take_over(o, u);
+  o->u_kept = u;
 }
 
 static void judge_missing(esokit_state *o)
 {
   if (o->gap >= MISSING_LIMIT) {
     o->mode = ESOKIT_SAFE;
-    o->special = (uint8_t)(o->special | OTHER_MODE);
   }
 #if !ESOKIT_STAYS_SAFE
   if ((o->mode == ESOKIT_SAFE) && (o->gap < DIVIDER)) {
@@ -67,53 +69,51 @@ static real wanted(esokit_state *o, real r)
   return u;
 }
 
-/* The last u for one that is not finite. */
-static real instead(esokit_state *o)
+/* u where it is not that of the law. */
+static real other_output(esokit_state *o)
 {
-  o->status = (uint16_t)(o->status | ESOKIT_REFERENCE_REJECTED);
-  return commanded(o);
-}
-
-static real wanted_specially(esokit_state *o, real r)
-{
-  real u;
-  if (!is_finite(r)) {
-    o->status = (uint16_t)(o->status | ESOKIT_REFERENCE_REJECTED);
-  }
-  if (o->mode == ESOKIT_RUNNING) {
-    u = wanted(o, r);
-  } else if (o->mode == ESOKIT_SAFE) {
-#if ESOKIT_HOLDS_SAFE
-    u = commanded(o);
-#else
-    u = SAFE_INPUT;
-#endif
-  } else {
+#if ESOKIT_HOLDS_AT_START
+  if (o->mode == ESOKIT_START_HOLD) {
     o->hold_left = o->hold_left - 1u;
     if (o->hold_left == 0u) {
       o->mode = ESOKIT_RUNNING;
     }
-    u = HOLD_INPUT;
+    return HOLD_INPUT;
   }
-  if (!is_finite(u)) {
-    u = instead(o);
-  }
-  o->special = (o->mode != ESOKIT_RUNNING) ? OTHER_MODE : 0u;
-  return u;
+#endif
+#if ESOKIT_HOLDS_SAFE
+  return commanded(o);
+#else
+  (void)o;
+  return SAFE_INPUT;
+#endif
 }
 
+/* After the observer's part of a sample. */
 static real put_out(esokit_state *o, real r)
 {
-  real u;
-  if (o->special != 0u) {
-    u = wanted_specially(o, r);
-  } else {
+  bool runs;
+  real u = r; /* which has to be finite where it is not used, too */
+  judge_missing(o);
+  runs = o->mode == ESOKIT_RUNNING;
+#if ESOKIT_ERROR_BASED
+  if (!is_finite(r)) {
+    o->status = (uint16_t)(o->status | ESOKIT_REFERENCE_REJECTED);
+  }
+#endif
+  if (runs) {
     u = wanted(o, r);
-    if (!is_finite(u)) {
-      u = instead(o);
-    }
+  }
+  if (!is_finite(u)) {
+    o->status = (uint16_t)(o->status | ESOKIT_REFERENCE_REJECTED);
+    u = commanded(o);
+  }
+  if (!runs) {
+    u = other_output(o);
   }
   (void)limit(o, u, &u);
+  o->u_kept = u;
+  o->elsewhere = 0u;
   return u;
 }
 
@@ -124,10 +124,12 @@ void esokit_init(esokit_state *o)
   o->phase = 0u;
 #endif
   o->u_kept = FIRST_KEPT;
+#if ESOKIT_HOLDS_AT_START
   o->hold_left = HOLD_SAMPLES;
+#endif
   o->gap = 0u;
   o->mode = FIRST_MODE;
-  o->special = FIRST_SPECIAL;
+  o->elsewhere = FIRST_ELSEWHERE;
   o->status = 0u;
 }
 
@@ -166,7 +168,7 @@ unsigned esokit_start(esokit_state *o, real y, real u)
     *o = before;
     return ESOKIT_STATE_REJECTED;
   }
-  (void)take_over(o, u);
+  take_command(o, u);
 #if ESOKIT_SOFTENS
   (void)harden(o);
 #endif
@@ -175,30 +177,28 @@ unsigned esokit_start(esokit_state *o, real y, real u)
 #endif
   o->gap = 0u;
   o->mode = ESOKIT_RUNNING;
-  o->special = ELSEWHERE;
+  o->elsewhere = 1u;
   return 0u;
 }
 
-static void after_trouble(esokit_state *o, real measured, unsigned status)
+/* After a gap too long to bridge. */
+static void rest_again(esokit_state *o, real measured)
 {
-  o->special = (uint8_t)(o->special | IN_TROUBLE);
-  if ((status & ESOKIT_RESTARTED) != 0u) {
 #if ESOKIT_GUARDED
-    const real held = applied_by_present(o);
+  const real held = applied_by_present(o);
 #elif ESOKIT_KNOWN
-    const real held = o->u_given;
+  const real held = o->u_given;
 #else
-    const real held = o->u_applied;
+  const real held = o->u_applied;
 #endif
-    const bool rests = observe_rest(o, measured, held);
+  const bool rests = observe_rest(o, measured, held);
 #if ESOKIT_GATED
-    if (rests) {
-      gate_set(o, true);
-    }
-#else
-    (void)rests;
-#endif
+  if (rests) {
+    gate_set(o, true);
   }
+#else
+  (void)rests;
+#endif
 }
 
 /* The observer's part of a sample. */
@@ -208,8 +208,8 @@ static void take_sample(esokit_state *o, real measured, real given)
   const bool planned = (o->gap + 1u) == DIVIDER;
 #endif
   unsigned status = observe_update(o, measured, given);
-  if (status != 0u) {
-    after_trouble(o, measured, status);
+  if ((status & ESOKIT_RESTARTED) != 0u) {
+    rest_again(o, measured);
   }
 #if ESOKIT_DIVIDED
   if (planned && (status == ESOKIT_GAP_BRIDGED)) {
@@ -217,7 +217,6 @@ static void take_sample(esokit_state *o, real measured, real given)
   }
 #endif
   o->status = (uint16_t)status;
-  judge_missing(o);
 }
 
 static void skip_sample(esokit_state *o, real given)
@@ -228,9 +227,7 @@ static void skip_sample(esokit_state *o, real given)
     o->phase = 0u;
   }
 #endif
-  o->special = (uint8_t)(o->special | IN_TROUBLE);
   o->status = (uint16_t)observe_predict(o, given);
-  judge_missing(o);
 }
 
 real esokit_update(esokit_state *o, real y, real r)
@@ -262,13 +259,9 @@ unsigned esokit_applied(esokit_state *o, real u)
   if (!is_finite(u)) {
     return ESOKIT_INPUT_REJECTED;
   }
-  if ((o->special & ELSEWHERE) != 0u) {
-    (void)take_over(o, u);
+  if (o->elsewhere != 0u) {
+    take_command(o, u);
   } else {
-    if ((o->special & TOLD) == 0u) {
-      o->u_kept = o->u_last;
-      o->special = (uint8_t)(o->special | TOLD);
-    }
     o->u_last = u;
   }
   return 0u;
@@ -285,11 +278,13 @@ static real hold_sample(esokit_state *o, real measured, real u)
   if (!good) {
     given = commanded(o);
   }
-  (void)take_over(o, given);
+  take_command(o, given);
+#if ESOKIT_HOLDS_AT_START
   if (o->mode == ESOKIT_START_HOLD) {
     o->mode = ESOKIT_RUNNING;
   }
-  o->special = ELSEWHERE;
+#endif
+  o->elsewhere = 1u;
   given = hold_guards(o);
 #if ESOKIT_DIVIDED
   if (o->phase != 0u) {
@@ -301,6 +296,7 @@ static real hold_sample(esokit_state *o, real measured, real u)
 #else
   take_sample(o, measured, given);
 #endif
+  judge_missing(o);
   release_guards(o);
   if (!good) {
     o->status = (uint16_t)(o->status | ESOKIT_INPUT_REJECTED);
@@ -332,10 +328,8 @@ bool esokit_adopt(esokit_state *o, const esokit_settings *settings)
     const real held = o->u_last;
     const real u = commanded(o);
     o->settings = settings;
-    (void)take_over(o, u);
-    o->u_kept = u;
+    take_command(o, u);
     o->u_last = held;
-    o->special = (uint8_t)(o->special | TOLD);
   }
   return is_ours;
 }

@@ -140,9 +140,9 @@ typedef struct {
   real u_held; /* what was reported before prepare */
 #endif
 #if ESOKIT_CONTROLLER
-  real u_kept; /* the last u of update, if u_last is what was reported since */
+  real u_kept; /* the last u of update; u_last is what was reported since */
 #endif
-#if ESOKIT_CONTROLLER || ESOKIT_PREDICTIVE
+#if ESOKIT_HOLDS_AT_START || ESOKIT_PREDICTIVE
   uint32_t hold_left; /* samples of the start hold */
 #endif
   uint16_t gap; /* samples since the last measurement that was taken */
@@ -154,7 +154,7 @@ typedef struct {
   uint8_t phase; /* 1: y was told, 2: it is missing, 3 and 4: and u, 5: started */
 #endif
 #if ESOKIT_CONTROLLER
-  uint8_t special; /* 0: u is that of the law, and nothing else was said */
+  uint8_t elsewhere; /* u was commanded by something else since the last sample */
 #endif
 } esokit_state;
 
