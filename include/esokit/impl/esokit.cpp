@@ -36,6 +36,8 @@
 #include <esokit/identify/impl/sinusoids.ipp>
 #include <esokit/identify/impl/spectrum.ipp>
 #include <esokit/identify/impl/timed_column.ipp>
+#include <esokit/sim/impl/statistics.ipp>
+#include <esokit/sim/impl/study_records.ipp>
 #include <esokit/tune/impl/controller_source.ipp>
 #include <esokit/tune/impl/families.ipp>
 #include <esokit/tune/impl/loop_cost.ipp>

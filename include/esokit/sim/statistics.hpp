@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <esokit/core/compiled.hpp>
 #include <esokit/core/language.hpp>
 #include <limits>
 #include <map>
@@ -28,44 +29,11 @@ struct RunSums {
   std::int64_t run_of_largest = 0;   ///< the first run that had the largest
 
   /// Adds a result. @param value finite
-  void add(std::int64_t run, double value, double limit) noexcept {
-    const double step = value - mean;
-    mean += step / static_cast<double>(++count);
-    squares += step * (value - mean);
-    if (count == 1 || value < smallest) {
-      smallest = value;
-      run_of_smallest = run;
-    }
-    if (count == 1 || value > largest) {
-      largest = value;
-      run_of_largest = run;
-    }
-    if (value <= limit) ++kept;
-  }
+  void add(std::int64_t run, double value, double limit) noexcept;
 
   /// Adds the sums of later runs (T. Chan, G. Golub, R. LeVeque, 1979). The last digits depend on
   /// where the runs were cut.
-  void join(const RunSums& later) noexcept {
-    if (later.count == 0) return;
-    if (count == 0) {
-      *this = later;
-      return;
-    }
-    const auto before = static_cast<double>(count), more = static_cast<double>(later.count);
-    const double step = later.mean - mean;
-    count += later.count;
-    kept += later.kept;
-    mean += step * (more / static_cast<double>(count));
-    squares += later.squares + step * step * (before * more / static_cast<double>(count));
-    if (later.smallest < smallest) {
-      smallest = later.smallest;
-      run_of_smallest = later.run_of_smallest;
-    }
-    if (later.largest > largest) {
-      largest = later.largest;
-      run_of_largest = later.run_of_largest;
-    }
-  }
+  void join(const RunSums& later) noexcept;
 
   /// Whether all are equal.
   friend bool operator==(const RunSums&, const RunSums&) = default;
@@ -85,19 +53,10 @@ class RunStatistics {
       : name_(std::move(name)), limit_(limit) {}
 
   /// Adds a result. @param run number of the run @param value finite
-  void add(std::int64_t run, double value) {
-    sums_.add(run, value, limit_);
-    ++bin(in_order(value) >> 40u);
-  }
+  void add(std::int64_t run, double value);
 
   /// Adds the results of later runs.
-  void join(const RunStatistics& later) {
-    sums_.join(later.sums_);
-    for (const auto& [page, counts] : later.pages_) {
-      auto& here = pages_[page];
-      for (std::size_t i = 0; i < counts.size(); ++i) here[i] += counts[i];
-    }
-  }
+  void join(const RunStatistics& later);
 
   /// Name of the result.
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
@@ -145,23 +104,7 @@ class RunStatistics {
   /// The quantile: the value below which a share of all results lies, interpolated within a bin;
   /// zero without results.
   /// @param share 0 .. 1
-  [[nodiscard]] double quantile(double share) const {
-    double below = share * static_cast<double>(sums_.count);
-    for (const auto& [page, counts] : pages_) {
-      for (std::size_t i = 0; i < counts.size(); ++i) {
-        const auto here = static_cast<double>(counts[i]);
-        if (here > 0.0 && below <= here) {
-          const std::uint64_t first = (page << 52u) | (static_cast<std::uint64_t>(i) << 40u);
-          const double low = number_of(first);
-          const double high = number_of(first + ((std::uint64_t{1} << 40u) - 1u));
-          const double inside = below > 0.0 ? below / here : 0.0;
-          return std::fmin(std::fmax(low + (high - low) * inside, sums_.smallest), sums_.largest);
-        }
-        below -= here;
-      }
-    }
-    return sums_.largest;
-  }
+  [[nodiscard]] double quantile(double share) const;
 
  private:
   std::uint64_t& bin(std::uint64_t number) {
@@ -169,10 +112,7 @@ class RunStatistics {
   }
   /// Converts a number to bits that have the same order as whole numbers, and back.
   /// @{
-  static std::uint64_t in_order(double value) noexcept {
-    const auto bits = std::bit_cast<std::uint64_t>(value);
-    return (bits & sign) != 0 ? ~bits : bits | sign;
-  }
+  static std::uint64_t in_order(double value) noexcept;
   static double number_of(std::uint64_t ordered) noexcept {
     return std::bit_cast<double>((ordered & sign) != 0 ? ordered & ~sign : ~ordered);
   }
@@ -186,3 +126,7 @@ class RunStatistics {
 };
 
 }  // namespace esokit::sim
+
+#if defined(ESOKIT_HEADER_ONLY)
+#include <esokit/sim/impl/statistics.ipp>
+#endif
