@@ -98,6 +98,44 @@ TEST(CState, OfControllers) {
   }
 }
 
+/// What was said since the last sample, too: u is the operator's, or the actuator holds another.
+template <class V>
+void goes_on_after_a_word(V rate) {
+  using C = Adrc<LinearEso<2, V>>;
+  auto settings = config<C>(8);
+  settings.limits.rate = rate;
+  for (const bool starts : {true, false}) {
+    C controller = C::make(settings).value();
+    Random random(71);
+    for (int k = 0; k < 50; ++k) (void)controller.update(measurement<V>(random, k), V(1));
+    if (starts) {
+      EXPECT_EQ(controller.start(V(0.25), V(0.5)), StepStatus::ok);
+    } else {
+      EXPECT_EQ(controller.applied(V(0.75)), StepStatus::ok);
+    }
+    const Folder folder;
+    InC<V> in_c(folder, to_c(controller, {.name = "loop"}).value(), true);
+    ASSERT_TRUE(in_c.loaded());
+    EXPECT_EQ(in_c.self_test(V(0)), 0);
+    if (starts) {  // it goes on being the operator's
+      EXPECT_EQ(controller.applied(V(-0.5)), StepStatus::ok);
+      EXPECT_EQ(in_c.applied(V(-0.5)), 0u);
+    }
+    for (int k = 0; k < 500; ++k) {
+      const V y = measurement<V>(random, k);
+      const V r = k < 3 ? hidden_nan<V>() : V(-1);  // u is the last command
+      EXPECT_TRUE(equal_bits(controller.update(y, r), in_c.update(y, r))) << starts << " " << k;
+      compare_estimates(controller.observer(), in_c, k);
+    }
+  }
+}
+
+TEST(CState, AfterAStartOrAReport) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  goes_on_after_a_word<double>(60);
+  goes_on_after_a_word<float>(esokit::Limits<float>{}.rate);
+}
+
 #endif  // ESOKIT_LOADS_C
 
 }  // namespace target_c_state_test

@@ -29,9 +29,8 @@ class FixedInC {
     static int count = 0;
     folder.write("eso.h", code.header);
     const std::string probe = "unsigned eso_status(const eso_state *o)";
-    folder.write("eso.c", code.source + (controls ? "\n" + probe + ";\n" + probe +
-                                                        "\n{\n  return o->status;\n}\n"
-                                                  : ""));
+    const std::string more = "\n" + probe + ";\n" + probe + "\n{\n  return o->status;\n}\n";
+    folder.write("eso.c", mutant(code.source) + (controls ? more : ""));
     const std::string out = folder.file("eso" + std::to_string(count++) + ".so");
     if (!runs(compiler + " -O2 -shared -fPIC -DESO_SELF_TEST" + std::string(strict) + "-o " + out +
               " " + folder.file("eso.c"))) {

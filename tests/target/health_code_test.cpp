@@ -72,7 +72,7 @@ std::array<int, 9> watches(double plant_gain, double bad, std::uint64_t seed, do
   const CCode health = to_c(watch, mine, {.name = "health", .comment = "a test"}).value();
   const Folder folder;
   folder.write("health.h", health.header);
-  folder.write("health.c", health.source);
+  folder.write("health.c", mutant(health.source));
   const Library library(folder, code,
                         std::string("#define REAL ") +
                             (sizeof(V) == sizeof(float) ? "float" : "double") + "\n#define ORDER " +

@@ -55,6 +55,18 @@ static int32_t within(int64_t x, int32_t most, unsigned *status)
   return held;
 }
 
+/* y or r for the observer: of a counter, from the last y on. */
+static int32_t counts(const esokit_state *o, y_count given)
+{
+#if ESOKIT_COUNTER
+  const uint32_t bits = (((uint32_t)given - o->y_last) & COUNTER_MASK) ^ COUNTER_HALF_U;
+  return (int32_t)bits - COUNTER_HALF;
+#else
+  (void)o;
+  return given;
+#endif
+}
+
 /* x = M x + m by; each number of M has its own power of two. */
 static unsigned moved(esokit_state *o, const int32_t m[STATES][COLUMNS], const uint8_t powers[STATES][COLUMNS],
                       int32_t by, const int32_t most[STATES])
@@ -129,12 +141,7 @@ static unsigned correct_slowly(esokit_state *o, y_count given, int32_t u)
 #endif
   unsigned status = ESOKIT_MEASUREMENT_REJECTED;
   unsigned elapsed = o->gap;
-#if ESOKIT_COUNTER
-  const uint32_t y_bits = (((uint32_t)given - o->y_last) & COUNTER_MASK) ^ COUNTER_HALF_U;
-  const int32_t y = (int32_t)y_bits - COUNTER_HALF;
-#else
-  const int32_t y = given;
-#endif
+  const int32_t y = counts(o, given);
   if (elapsed < 1u) {
     elapsed = 1u;
   }
@@ -178,6 +185,24 @@ int32_t esokit_estimate(const esokit_state *o, unsigned row)
     break;
   }
   return value;
+}
+
+void esokit_init(esokit_state *o)
+{
+#if ESOKIT_SETTINGS
+  o->settings = &esokit_DESIGN_SET;
+#endif
+#if ESOKIT_COUNTER
+  o->y_last = 0u;
+#endif
+  (void)rest_at(o, 0, 0);
+#if ESOKIT_CONTROLLER
+  o->u_last = START_FINE;
+  o->u_held = START_HELD;
+  o->hold_left = HOLD_SAMPLES;
+  o->mode = FIRST_MODE;
+  o->status = 0u;
+#endif
 }
 
 #if ESOKIT_CONTROLLER
@@ -238,12 +263,7 @@ ESOKIT_APART static int32_t put_out_held(esokit_state *o)
 
 static int32_t put_out(esokit_state *o, y_count reference)
 {
-#if ESOKIT_COUNTER
-  const uint32_t r_bits = (((uint32_t)reference - o->y_last) & COUNTER_MASK) ^ COUNTER_HALF_U;
-  const int32_t r = (int32_t)r_bits - COUNTER_HALF;
-#else
-  int32_t r = reference;
-#endif
+  int32_t r = counts(o, reference);
 #if !ESOKIT_COUNTER
   if (r > Y_MOST) {
     r = Y_MOST;
@@ -266,22 +286,6 @@ ESOKIT_APART static int32_t update_guarded(esokit_state *o, y_count y, y_count r
   o->status = (uint8_t)guarded(o, y, o->u_held);
   judge_missing(o);
   return put_out(o, r);
-}
-
-void esokit_init(esokit_state *o)
-{
-#if ESOKIT_SETTINGS
-  o->settings = &esokit_DESIGN_SET;
-#endif
-#if ESOKIT_COUNTER
-  o->y_last = 0u;
-#endif
-  (void)rest_at(o, 0, 0);
-  o->u_last = START_FINE;
-  o->u_held = START_HELD;
-  o->hold_left = HOLD_SAMPLES;
-  o->mode = FIRST_MODE;
-  o->status = 0u;
 }
 
 unsigned esokit_start(esokit_state *o, y_count given, int32_t u)
@@ -311,12 +315,7 @@ unsigned esokit_start(esokit_state *o, y_count given, int32_t u)
 
 int32_t esokit_update(esokit_state *o, y_count given, y_count r)
 {
-#if ESOKIT_COUNTER
-  const uint32_t y_bits = (((uint32_t)given - o->y_last) & COUNTER_MASK) ^ COUNTER_HALF_U;
-  const int32_t y = (int32_t)y_bits - COUNTER_HALF;
-#else
-  const int32_t y = given;
-#endif
+  const int32_t y = counts(o, given);
   if ((o->gap != 0u) || (((uint32_t)y + Y_MOST_U) > Y_TWICE)) {
     return update_guarded(o, given, r);
   }
@@ -356,17 +355,6 @@ int32_t esokit_update_without_measurement(esokit_state *o, y_count r)
 }
 
 #else
-void esokit_init(esokit_state *o)
-{
-#if ESOKIT_SETTINGS
-  o->settings = &esokit_DESIGN_SET;
-#endif
-#if ESOKIT_COUNTER
-  o->y_last = 0u;
-#endif
-  (void)rest_at(o, 0, 0);
-}
-
 unsigned esokit_reset(esokit_state *o, y_count given)
 {
 #if ESOKIT_COUNTER
@@ -388,12 +376,7 @@ unsigned esokit_predict(esokit_state *o, int32_t u)
 
 unsigned esokit_update(esokit_state *o, y_count given, int32_t u)
 {
-#if ESOKIT_COUNTER
-  const uint32_t y_bits = (((uint32_t)given - o->y_last) & COUNTER_MASK) ^ COUNTER_HALF_U;
-  const int32_t y = (int32_t)y_bits - COUNTER_HALF;
-#else
-  const int32_t y = given;
-#endif
+  const int32_t y = counts(o, given);
   if ((o->gap != 0u) || (((uint32_t)y + Y_MOST_U) > Y_TWICE) || (((uint32_t)u + U_MOST_U) > U_TWICE)) {
     return guarded(o, given, u);
   }
