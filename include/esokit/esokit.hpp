@@ -39,6 +39,7 @@
 #include <esokit/analysis/worst_case.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/adrc_law.hpp>
+#include <esokit/control/approach_profile.hpp>
 #include <esokit/control/control_loop.hpp>
 #include <esokit/control/controller.hpp>
 #include <esokit/control/cycle_analysis.hpp>

@@ -15,6 +15,7 @@
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/control/nonlinear_feedback.hpp>
 #include <esokit/control/predictive_adrc.hpp>
+#include <esokit/control/approach_profile.hpp>
 #include <esokit/control/smooth_profile.hpp>
 #include <esokit/control/tracking_differentiator.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
@@ -64,6 +65,7 @@ template class Adrc<AlgebraicEso<1>>;
 template class Adrc<ExtendedStateFilter<1>>;
 template class NonlinearFeedback<1>;
 template class TrackingDifferentiator<double>;
+template class ApproachProfile<2, 3>;
 template class SmoothProfile<1>;
 template class Limiter<double>;
 template class Fal<double>;

@@ -169,14 +169,18 @@ class Driver final : public Game {
     }
   }
 
-  /// The same of what `runs_on`: at rest. On the way each call goes on.
+  /// The same of what `runs_on`: at rest, if it says when it is. On the way each call goes on.
   template <class Function>
   void refusable_at_rest(Function&& call) {
-    const bool moved = object_->moving();
-    remember();
-    accepted_ = quietly(call);
-    if (!moved) return answered(accepted_);
-    if (!changed()) fail("a move does not go on");
+    if constexpr (requires { object_->moving(); }) {
+      const bool moved = object_->moving();
+      remember();
+      accepted_ = quietly(call);
+      if (!moved) return answered(accepted_);
+      if (!changed()) fail("a move does not go on");
+    } else {
+      accepted_ = quietly(call);
+    }
   }
 
   // ------------------------------------------------------------------ invariants of steps
@@ -998,12 +1002,24 @@ class Driver final : public Game {
           if (d.calm_ && d.tape_->plain() && !d.accepted_) d.fail("a good reference is refused");
         });
       }
-      add(a, "reset", [](Driver& d) {
-        const S r = d.number();
-        d.refusable([&] { return d.object_->reset(r); });
-        if (is_finite(r) != d.accepted_)
-          d.fail("reset takes what is not finite, or refuses what is");
-      });
+      if constexpr (requires(T & o, S s) { o.reset(s); }) {
+        add(a, "reset", [](Driver& d) {
+          const S r = d.number();
+          d.refusable([&] { return d.object_->reset(r); });
+          if (is_finite(r) != d.accepted_)
+            d.fail("reset takes what is not finite, or refuses what is");
+        });
+      } else if constexpr (requires(T & o, S s) {
+                             o.feed();
+                             o.start(s, s);
+                           }) {
+        add(a, "start", [](Driver& d) {
+          const S y = d.number(), u = d.number();
+          d.refusable([&] { return d.object_->start(y, u); });
+          if (d.accepted_ && !(is_finite(y) && is_finite(u)))
+            d.fail("start takes what is not finite");
+        });
+      }
     }
     if constexpr (requires(const T& o, const esokit::Vector<S, order_of<T>() + 1>& z,
                            const esokit::Vector<S, order_of<T>()>& r) {

@@ -2,6 +2,7 @@
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
+#include <esokit/control/approach_profile.hpp>
 #include <esokit/control/experiment.hpp>
 #include <esokit/control/nonlinear_feedback.hpp>
 #include <esokit/control/smooth_profile.hpp>
@@ -24,6 +25,7 @@ void add_filters(std::vector<Kind>& kinds) {
   KIND(TrackingDifferentiator<float>);
   KIND(NonlinearFeedback<2, float>);
   KIND(SmoothProfile<2, float>);
+  KIND(ApproachProfile<2, 3, float>);
 #ifndef ESOKIT_ONE_TYPE
   KIND(ExtendedStateFilter<2, double>);
   KIND(WrappedOutput<ExtendedStateFilter<2, float>>);
@@ -32,6 +34,7 @@ void add_filters(std::vector<Kind>& kinds) {
   KIND(Experiment<1, double>);
   KIND(TrackingDifferentiator<double>);
   KIND(SmoothProfile<1, float>);
+  KIND(ApproachProfile<1, 0, double>);
   KIND(SmoothProfile<4, float>);
   KIND(SmoothProfile<3, double>);
 #endif

@@ -223,7 +223,7 @@ Design Design::make(const Settings& settings, const Input& input, const Findings
   const double T = model.sample_time;
   const LinearController form = design.form();
   const Replay all = through(form, found.input_gain.value, found.order, findings.rows);
-  design.pasting_ = Pasting::make(settings, input, found, model, all.load,
+  design.pasting_ = Pasting::make(settings, input, found, model, all,
                                   Feed::make(input, found, model, findings.rows));
   design.told_ = told_rows(design.pasting_.feeds, findings.rows);
   const esokit::FitData& rows = design.told_;

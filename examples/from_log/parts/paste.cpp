@@ -208,6 +208,7 @@ std::string includes_of(const std::string& code) {
   constexpr Header headers[] = {{"Guarded<", "adapter/guarded.hpp"},
                                 {"OutlierGate<", "adapter/outlier_gate.hpp"},
                                 {"Adrc<", "control/adrc.hpp"},
+                                {"ApproachProfile<", "control/approach_profile.hpp"},
                                 {"HealthMonitor<", "control/health.hpp"},
                                 {"SmoothProfile<", "control/smooth_profile.hpp"},
                                 {"HalfGainPoles", "gain/half_gain.hpp"},
@@ -285,6 +286,7 @@ Replay through(const esokit::LinearController& form, double input_gain, int orde
     replay.t.push_back(static_cast<double>(k) * rows.sample_time);
     replay.estimate.push_back(corrected + offset);
     replay.load.push_back(estimate(order, y) / input_gain);
+    replay.before.push_back(estimate(order - 1, y) + (order == 1 ? offset : 0.0));
     // The measurement that the observer had expected would not have moved it.
     replay.innovation.push_back((y - corrected) / (1 - direct));
     for (int i = 0; i < n; ++i) {
@@ -415,11 +417,11 @@ esokit::FitData told_rows(const std::vector<Feed>& feeds, const esokit::FitData&
 double Pasting::reach() const {
   double sum = 0.0;
   for (const Feed& feed : feeds) sum += feed.reach;
-  return printed(sum);
+  return printed(sum + pole_reach);
 }
 
 double Pasting::known(double r, double rate) const {
-  double sum = 0.0;
+  double sum = order == 2 ? pole * rate : 0.0;
   if (friction > 0.0) sum += friction * std::tanh((order == 1 ? r : rate) / friction_scale);
   if (by_position) sum -= force(r);
   return sum / input_gain;
@@ -428,16 +430,22 @@ double Pasting::known(double r, double rate) const {
 std::vector<double> Pasting::limits(const TuneModel& model, std::size_t gains) const {
   std::vector<double> all(gains, 0.0);
   const auto n = static_cast<std::size_t>(order);
-  all[n - 1] = limit;
-  if (n >= 2) all[n - 2] = rate_limit;
-  // The lag asks for r^(n) + tau r^(n+1).
-  if (gains > n) all[n] = printed(0.6 * limit / model.lag);
+  const bool settles = n >= 2 && std::abs(model.pole) > 0.0;
+  // A pole asks for a r^(n-1) beside r^(n), the lag for tau r^(n+1). They peak one after another:
+  // of a smooth step each adds six tenths at most to the peak of both.
+  const double share = 0.9 / (1.0 + 0.6 * (settles ? 1 : 0) + 0.6 * (gains > n ? 1 : 0));
+  all[n - 1] = printed(share * room);
+  if (settles) all[n - 2] = printed(share * room / std::abs(model.pole));
+  if (gains > n) all[n] = printed(share * room / model.lag);
   return all;
 }
 
+double Pasting::approach(const TuneModel& model, int gains) const {
+  return printed(0.7 / (model.latency() - (gains == 2 ? model.lag : 0.0)));
+}
+
 Pasting Pasting::make(const Settings& settings, const Input& input, const esokit::Identified& found,
-                      const TuneModel& model, const std::vector<double>& load,
-                      std::vector<Feed> feeds) {
+                      const TuneModel& model, const Replay& replay, std::vector<Feed> feeds) {
   Pasting p;
   p.feeds = std::move(feeds);
   const std::string name = source_of(settings).file_name();
@@ -465,17 +473,18 @@ Pasting Pasting::make(const Settings& settings, const Input& input, const esokit
     }
     for (auto& factor : p.force.factors) factor.value = printed(factor.value);
   }
-  // The range of u that the forces of the log leave, in both directions.
+  // A pole that the log tells is no part of the disturbance: along the reference u has what it
+  // asks.
+  if (p.order <= 2 && found.pole.low() > 0.0) p.pole = printed(found.pole.value);
+  // The range of u that the forces of the log leave beside it, in both directions.
   std::vector<double> needed;
-  for (const double l : load) needed.push_back(-l);
+  for (std::size_t k = 0; k < replay.load.size(); ++k)
+    needed.push_back(-replay.load[k] - p.pole * replay.before[k] / p.input_gain);
   const double low = quantile(needed, 0.05), high = quantile(needed, 0.95);
   const double room = std::clamp(std::min(model.u_max - high, low - model.u_min), 0.2 * half, half);
-  const double share = 0.5 * room * std::abs(p.input_gain);
-  p.limit = printed(share);
-  if (p.order >= 2 && std::abs(model.pole) > 0.0) {
-    p.rate_limit = printed(0.6 * share / std::abs(model.pole));
-  }
+  p.room = room * std::abs(p.input_gain);
   p.shortest = printed(4.0 * model.latency());
+  p.dead_time = printed(model.dead_time);
   const auto& y = input.log.y;
   double mean = 0.0, least = std::numeric_limits<double>::infinity(), most = -least;
   std::size_t count = 0;
@@ -487,6 +496,10 @@ Pasting Pasting::make(const Settings& settings, const Input& input, const esokit
     most = std::max(most, value);
   }
   mean /= static_cast<double>(std::max<std::size_t>(count, 1));
+  // Of order 2 at the speed that half the range of u holds, of order 1 anywhere in the log.
+  if (p.pole > 0.0 && count > 0) {
+    p.pole_reach = printed(p.order == 1 ? p.pole * (most - least) / std::abs(p.input_gain) : half);
+  }
   if (least > 0.0 || most < 0.0) p.start_y = std::strtod(number_text(mean, 3).c_str(), nullptr);
   if (model.u_min > -0.1 * half || model.u_max < 0.1 * half) {
     p.start_u = printed(0.5 * (model.u_min + model.u_max));
@@ -518,18 +531,33 @@ Pasting Pasting::make(const Settings& settings, const Input& input, const esokit
   return p;
 }
 
+Runner::Profile Runner::profile_of(const Pasting& p, const TuneModel& model, int gains) {
+  const double T = model.sample_time;
+  if (p.order == 1) {
+    return esokit::detail::with_number<1, 2>(gains, [&](auto order) -> Profile {
+      return esokit::ApproachProfile<order(), most_delay>::make(
+                 {.pole = p.pole,
+                  .lag = order() == 2 ? model.lag : 0.0,
+                  .input_gain = p.input_gain,
+                  .limits = {.lower = model.u_min, .upper = model.u_max},
+                  .dead_time = p.dead_time,
+                  .bandwidth = p.approach(model, gains),
+                  .sample_time = T})
+          .value();
+    });
+  }
+  return esokit::detail::with_number<2, 4>(gains, [&](auto order) -> Profile {
+    esokit::SmoothProfileConfig<order()> config{.shortest_time = p.shortest, .sample_time = T};
+    const auto limits = p.limits(model, static_cast<std::size_t>(gains));
+    std::copy(limits.begin(), limits.end(), config.limits.begin());
+    return esokit::SmoothProfile<order()>::make(config).value();
+  });
+}
+
 Runner::Runner(const Pasting& pasting, const Tuning& tuning, const TunedDesign& design)
     : pasting_(&pasting),
       form_(esokit::detail::told_of_input(design.controller)),
-      profile_(esokit::detail::with_number<1, 4>(
-          static_cast<int>(design.settings.gains.size()),
-          [&](auto order) -> Profile {
-            esokit::SmoothProfileConfig<order()> config{.shortest_time = pasting.shortest,
-                                                        .sample_time = tuning.model.sample_time};
-            const auto limits = pasting.limits(tuning.model, design.settings.gains.size());
-            std::copy(limits.begin(), limits.end(), config.limits.begin());
-            return esokit::SmoothProfile<order()>::make(config).value();
-          })),
+      profile_(profile_of(pasting, tuning.model, static_cast<int>(design.settings.gains.size()))),
       feeds_(pasting.feeds.begin(), pasting.feeds.end()),
       lower_(tuning.model.u_min),
       upper_(tuning.model.u_max),
@@ -543,7 +571,15 @@ Runner::Runner(const Pasting& pasting, const Tuning& tuning, const TunedDesign& 
 
 void Runner::start(double y, double u) {
   std::fill(state_.begin(), state_.end(), 0.0);
-  std::visit([&](auto& profile) { profile.reset(y); }, profile_);
+  std::visit(
+      [&](auto& profile) {
+        if constexpr (requires { profile.feed(); }) {
+          profile.start(y, u);
+        } else {
+          profile.reset(y);
+        }
+      },
+      profile_);
   y_ = y;
   u_ = u - pasting_->known(y, 0.0);
   for (std::size_t i = 0; i < feeds_.size(); ++i) feeds_[i].start(pasting_->feeds[i].rest);
@@ -551,10 +587,13 @@ void Runner::start(double y, double u) {
 
 double Runner::update(double y, double target, const std::vector<double>& w) {
   motion_ = {};
+  fed_ = 0.0;
+  double known = 0.0;
   std::visit(
       [&](auto& profile) {
         profile.update(target);
         const auto motion = profile.motion();
+        if constexpr (requires { profile.feed(); }) known = profile.feed();
         for (int i = 0; i < motion.rows(); ++i) motion_[static_cast<std::size_t>(i)] = motion(i);
       },
       profile_);
@@ -563,10 +602,9 @@ double Runner::update(double y, double target, const std::vector<double>& w) {
   for (std::size_t i = 0; i < weights_.size(); ++i) u += weights_[i] * motion_[i];
   const int n = form_.states();
   for (int i = 0; i < n; ++i) u += form_.to_u(0, i) * state_[static_cast<std::size_t>(i)];
-  fed_ = 0.0;
   for (std::size_t i = 0; i < feeds_.size(); ++i)
     fed_ += feeds_[i].update(i < w.size() ? w[i] : std::nan(""));
-  const double known = pasting_->known(motion_[0], motion_[1]) + fed_;
+  known += pasting_->known(motion_[0], motion_[1]) + fed_;
   const double more = pasting_->reach();
   u = std::clamp(std::clamp(u, lower_ - more, upper_ + more) + known, lower_, upper_);
   std::vector<double> next = state_;
@@ -686,7 +724,12 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
   }
   body += "\nstruct Loop {\n";
   body += "  esokit::Adrc<Observer> controller;\n";
-  body += "  esokit::SmoothProfile<" + std::to_string(gains) + "> profile;\n";
+  const bool approaches = p.order == 1;
+  const std::string profile =
+      approaches ? "esokit::ApproachProfile<" + std::to_string(gains) + ", " +
+                       std::to_string(static_cast<int>(p.dead_time / T + 0.5)) + ">"
+                 : "esokit::SmoothProfile<" + std::to_string(gains) + ">";
+  body += "  " + profile + " profile;\n";
   body +=
       "  esokit::HealthMonitor<" + std::to_string(model.order + design.extension) + "> monitor;\n";
   if (known)
@@ -740,13 +783,30 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
       "the u at which it rests, or zero and a brake.",
       "         ");
   body += wrapped(limits_of_u + "});", "         ", " ");
-  body += comment("From rest to rest, with all derivatives: largest abs(r'), .., abs(r" +
-                      std::string(static_cast<std::size_t>(gains), '\'') + "), 0 is none. " +
-                      highest + " needs half of what the forces of the log leave of u.",
-                  "    ");
-  body += "    const auto profile = esokit::SmoothProfile<" + std::to_string(gains) + ">::make(\n";
-  body += "        {.limits = {{" + list(p.limits(model, design.settings.gains.size())) +
-          "}}, .shortest_time = " + source(p.shortest) + ", .sample_time = " + source(T) + "});\n";
+  if (approaches) {
+    body += comment(
+        "To any target, which may change at any time: at nine tenths of the speed that the limits "
+        "of u leave, and with this bandwidth at the end. It adds to u what the machine needs" +
+            std::string(p.pole > 0.0 ? ", also at rest." : "."),
+        "    ");
+    body += "    const auto profile = " + profile + "::make(\n";
+    body += wrapped("{.pole = " + source(p.pole) +
+                        (gains == 2 ? ", .lag = " + source(model.lag) : std::string()) +
+                        ", .input_gain = " + source(p.input_gain) + ", .limits = {.lower = " +
+                        source(model.u_min) + ", .upper = " + source(model.u_max) +
+                        "}, .dead_time = " + source(p.dead_time) + ", .bandwidth = " +
+                        source(p.approach(model, gains)) + ", .sample_time = " + source(T) + "});",
+                    "        ", " ");
+  } else {
+    body += comment("From rest to rest, with all derivatives: largest abs(r'), .., abs(r" +
+                        std::string(static_cast<std::size_t>(gains), '\'') + "), 0 is none. " +
+                        highest + " needs what the forces of the log leave of u, less a tenth.",
+                    "    ");
+    body += "    const auto profile = " + profile + "::make(\n";
+    body += "        {.limits = {{" + list(p.limits(model, design.settings.gains.size())) +
+            "}}, .shortest_time = " + source(p.shortest) + ", .sample_time = " + source(T) +
+            "});\n";
+  }
   body += comment("The noise is that which makes the innovations of the log.", "    ");
   body += "    const auto monitor = esokit::HealthMonitor<" +
           std::to_string(model.order + design.extension) + ">::make(\n";
@@ -764,21 +824,24 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
       "    if (fails(controller) || fails(profile) || fails(monitor)) return {};\n"
       "    return Loop{*controller, *profile, *monitor};\n"
       "  }\n";
-  const bool along = p.friction > 0.0 || p.by_position;
+  const bool damps = p.order == 2 && p.pole > 0.0;
+  const bool along = p.friction > 0.0 || p.by_position || damps;
   if (along) {
     std::string what = p.friction > 0.0 ? "friction" : "";
+    if (damps) what += std::string(what.empty() ? "" : " and ") + "damping";
     if (p.by_position) what += std::string(what.empty() ? "" : " and ") + "the force by y";
-    body +=
-        "\n" + comment("What " + what + (p.friction > 0.0 && p.by_position ? " need" : " needs") +
-                           " of u along the reference. By the reference, not by y: so it "
-                           "changes no margin.",
-                       "  ");
+    body += "\n" + comment("What " + what +
+                               (what.find(" and ") != std::string::npos ? " need" : " needs") +
+                               " of u along the reference. By the reference, not by y: so it "
+                               "changes no margin.",
+                           "  ");
     body += "  static double known([[maybe_unused]] double r, [[maybe_unused]] double rate) {\n";
     body += "    double force = 0.0;  // " + highest + "\n";
     if (p.friction > 0.0) {
       body += "    force += " + source(p.friction) + " * std::tanh(" +
               (p.order == 1 ? "r" : "rate") + " / " + source(p.friction_scale) + ");\n";
     }
+    if (damps) body += "    force += " + source(p.pole) + " * rate;\n";
     if (p.by_position) {
       // As printed, and as it is computed here.
       body += "    const double x = (std::clamp(r, " + source(p.force.low) + ", " +
@@ -804,25 +867,28 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
     const std::string name = "feed" + std::to_string(i + 1);
     fed_at_start += (fed_at_start.empty() ? "" : " + ") + name + ".factor * " + name + ".before";
   }
+  body += std::string("  void start(double y, double u_now) {\n") +
+          (approaches ? "    profile.start(y, u_now);\n" : "    profile.reset(y);\n") + starts +
+          (known ? "    u = u_now;\n    fed = " + (fed_at_start.empty() ? "0.0" : fed_at_start) +
+                       ";\n    controller.start(y, u - fed);\n"
+                 : "    controller.start(y, u_now);\n") +
+          "    monitor.clear();\n  }\n";
   body +=
-      std::string("  void start(double y, double u_now) {\n") + "    profile.reset(y);\n" + starts +
-      (known
-           ? "    u = u_now;\n    fed = " + fed_at_start + ";\n    controller.start(y, u - fed);\n"
-           : "    controller.start(y, u_now);\n") +
-      "    monitor.clear();\n  }\n";
-  body +=
-      "\n" + comment(
-                 "Once a sample. y is measured, NaN where it is missing; target is where y shall "
-                 "go: a new one begins a move, at the end of the last. Returns u, to be held until "
-                 "the next call.",
-                 "  ");
+      "\n" +
+      comment(
+          "Once a sample. y is measured, NaN where it is missing; target is where y shall go" +
+              std::string(approaches ? "" : ": a new one begins a move, at the end of the last") +
+              ". Returns u, to be held until the next call.",
+          "  ");
   body += "  double update(double y, double target) {\n    profile.update(target);\n";
+  std::string more = approaches ? "profile.feed()" : "";
+  if (along) more += (more.empty() ? "" : " + ") + std::string("known(r(0), r(1))");
+  if (!fed.empty()) more += (more.empty() ? "" : " + ") + fed;
   if (known) {
     body +=
         "    const auto r = profile.motion();  // (r, r', ..)\n"
         "    const double more = " +
-        (along ? std::string("known(r(0), r(1))") : std::string()) +
-        (along && !fed.empty() ? " + " : "") + fed +
+        more +
         ";\n"
         "    controller.applied(u - fed);  // if the actuator reports what it really held, in "
         "place "
@@ -846,11 +912,12 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
       "    return u;\n  }\n};\n\n";
 
   // The self-check: a step that takes about 60 samples, if u can hold its end.
-  double height = p.limit / esokit::smooth_step_peaks<1>[0];
+  double height =
+      p.limits(model, design.settings.gains.size())[static_cast<std::size_t>(p.order - 1)];
   const std::array<double, 3> peaks{esokit::smooth_step_peaks<1>[0],
                                     esokit::smooth_step_peaks<2>[1],
                                     esokit::smooth_step_peaks<3>[2]};
-  height = p.limit / peaks[static_cast<std::size_t>(p.order - 1)];
+  height /= peaks[static_cast<std::size_t>(p.order - 1)];
   for (int i = 0; i < p.order; ++i) height *= 60 * T;
   const double half = 0.5 * (model.u_max - model.u_min);
   if (p.order == 1 && std::abs(model.pole) > 0.0) {

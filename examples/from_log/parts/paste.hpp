@@ -10,6 +10,7 @@
 #include <variant>
 #include <vector>
 
+#include <esokit/control/approach_profile.hpp>
 #include <esokit/control/smooth_profile.hpp>
 #include <esokit/tune/tune.hpp>
 
@@ -60,6 +61,7 @@ class FeedPath {
 /// The log through an observer.
 struct Replay {
   std::vector<double> t, estimate, load, innovation;  ///< load: dhat / b0
+  std::vector<double> before;                         ///< estimate of y^(n-1)
   double band = 0;    ///< 95 % of the innovations are within this, says the model
   double inside = 0;  ///< share of the log's that are
 };
@@ -89,31 +91,39 @@ struct Pasting {
   bool by_position = false;         ///< the force by y is used
   esokit::PositionForce force;      ///< it
   double start_y = 0, start_u = 0;  ///< the machine rests there before the self-check
-  double limit = 0;                 ///< largest r^(n) of the profile
-  double rate_limit = 0;            ///< largest r^(n-1), by the pole; 0: none
+  double pole = 0;                  ///< of y^(n-1), where it is known well; part of u along r
+  double pole_reach = 0;            ///< what it may ask of u
+  double dead_time = 0;             ///< of u, s
+  double room = 0;                  ///< what the forces of the log leave of u, unit of y^(n)
   double shortest = 0;              ///< no move of the profile is shorter, s
   std::vector<Feed> feeds;          ///< of the measured disturbances
 
-  /// @param load of the log, unit of u, see Replay
+  /// @param replay of the log
   [[nodiscard]] static Pasting make(const Settings& settings, const Input& input,
                                     const esokit::Identified& found, const esokit::TuneModel& model,
-                                    const std::vector<double>& load, std::vector<Feed> feeds);
+                                    const Replay& replay, std::vector<Feed> feeds);
 
   /// Whether the code adds what is known of the machine to u.
   [[nodiscard]] bool feeds_forward() const {
-    return friction > 0.0 || by_position || !feeds.empty();
+    return order == 1 || friction > 0.0 || by_position || pole > 0.0 || !feeds.empty();
   }
   /// What measured disturbances may ask of u, together: by so much the limits of the law are wider
   /// than those of u.
   [[nodiscard]] double reach() const;
   /// What of the machine is used and what is not, after "with settings from the log".
   [[nodiscard]] std::string used() const;
-  /// What friction and the force by y need of u along the reference.
+  /// What friction, the force by y and the damping need of u along the reference.
   [[nodiscard]] double known(double r, double rate) const;
   /// Largest derivatives of the profile of a law with so many gains: n, or n + 1 where its observer
   /// knows the lag.
   [[nodiscard]] std::vector<double> limits(const esokit::TuneModel& model, std::size_t gains) const;
+  /// Order 1: bandwidth of the profile of a law with so many gains, rad/s: simulated with b0 off by
+  /// 8 %, the pole by 20 % and the dead time by 15 %, it overshoots by 4 % at most.
+  [[nodiscard]] double approach(const esokit::TuneModel& model, int gains) const;
 };
+
+/// Samples of the longest dead time that `tune` takes.
+inline constexpr int most_delay = 100;
 
 /// What the code computes, sample by sample, whatever its types: a design within its limits, with
 /// the profile and what is known.
@@ -130,8 +140,12 @@ class Runner {
   [[nodiscard]] const std::array<double, 5>& motion() const { return motion_; }
 
  private:
-  using Profile = std::variant<esokit::SmoothProfile<1>, esokit::SmoothProfile<2>,
-                               esokit::SmoothProfile<3>, esokit::SmoothProfile<4>>;
+  using Profile =
+      std::variant<esokit::ApproachProfile<1, most_delay>, esokit::ApproachProfile<2, most_delay>,
+                   esokit::SmoothProfile<2>, esokit::SmoothProfile<3>, esokit::SmoothProfile<4>>;
+
+  [[nodiscard]] static Profile profile_of(const Pasting& pasting, const esokit::TuneModel& model,
+                                          int gains);
 
   const Pasting* pasting_;
   esokit::LinearController form_;
