@@ -329,6 +329,14 @@ TEST(StructuredText, OfAdapters) {
   controls<Adrc<KnownModel<WrappedOutput<LinearEso<1, float>>, Slope<float>>>>(381);
 }
 
+TEST(StructuredText, OfTheCurveOfAnActuator) {
+  if (!there("python3")) GTEST_SKIP() << "no python3";
+  controls<Adrc<MappedInput<LinearEso<2, float>>>>(391);
+  controls<DisturbanceCompensator<MappedInput<DelayedInput<LinearEso<1, double>, 3>>>>(392);
+  controls<Adrc<MappedInput<Guarded<LinearEso<1, double>>>, ErrorBased>>(393);
+  observes_in_text<MappedInput<Guarded<LinearEso<2, float>>>>(394);
+}
+
 TEST(StructuredText, OfGuards) {
   if (!there("python3")) GTEST_SKIP() << "no python3";
   controls<Adrc<Guarded<LinearEso<2, double>>>>(401);

@@ -43,6 +43,11 @@ auto observer_config(double input_gain) {
   if constexpr (requires { config.observer; }) {
     config.observer = observer_config<typename Observer::Adapted>(input_gain);
     if constexpr (requires { config.delay; }) config.delay = 3;
+    if constexpr (requires { config.curve; }) {
+      config.curve = decltype(config.curve)::dead_zone(V(0.5), V(0.25));
+      config.curve.input[0] = V(-0.6);
+      config.curve.slope_above = V(1.25);
+    }
     if constexpr (requires { config.inputs; }) {
       config.inputs[0] = {V(-3), V(0.03), V(0.02)};
       if (config.inputs.size() > 1) config.inputs[1] = {V(2), V(0), V(0.011)};

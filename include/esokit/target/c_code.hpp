@@ -75,12 +75,12 @@ inline CCode c_code(const RecordedDesign& design) {
 /// AdjustableBandwidthEso, NonlinearEso, ModelEso, PlantEso and their cascades (not with
 /// `follows_speed`), AlgebraicEso, ExtendedStateFilter (in its modes recursive and frozen, without
 /// a nominal model), these in DelayedInput, OutlierGate and WrappedOutput, in KnownModel if its
-/// function is generic (not AlgebraicEso), in Measured (not around WrappedOutput or another
-/// Measured, and not in Guarded), LinearEso and CascadeEso in Guarded, too (a changing b0 unless
-/// the law softens), Adrc of both forms and DisturbanceCompensator around them, and PredictiveAdrc
-/// around one without an adapter whose gain is known before the measurement (not
-/// AdjustableBandwidthEso or NonlinearEso), so EPADRC around ExtendedStateFilter, too. Others do
-/// not compile.
+/// function is generic (not AlgebraicEso), in MappedInput (where the law does not soften; the curve
+/// is no setting), in Measured (not around WrappedOutput or another Measured, and not in Guarded),
+/// LinearEso and CascadeEso in Guarded, too (a changing b0 unless the law softens), Adrc of both
+/// forms and DisturbanceCompensator around them, and PredictiveAdrc around one without an adapter
+/// whose gain is known before the measurement (not AdjustableBandwidthEso or NonlinearEso), so
+/// EPADRC around ExtendedStateFilter, too. Others do not compile.
 ///
 /// The function of a KnownModel is recorded like all else, with its own numbers as constants: it is
 /// `template <class E> auto operator()(const E& x) const noexcept`, or a template of the scalar
@@ -117,7 +117,8 @@ void to_c(const Other&, const CodeOptions& = {}) {
       !detail::knows_in_general<Other> || detail::Writable<Other>,
       "esokit: to_c writes LinearEso, HalfGainEso, ReducedOrderEso, CascadeEso, "
       "AdjustableBandwidthEso, NonlinearEso, ModelEso, PlantEso, AlgebraicEso and "
-      "ExtendedStateFilter, these in DelayedInput, OutlierGate, WrappedOutput and Measured, in "
+      "ExtendedStateFilter, these in DelayedInput, OutlierGate, WrappedOutput, Measured and "
+      "MappedInput, in "
       "KnownModel (not AlgebraicEso), on the chain with one extended state in Guarded, and "
       "Adrc and DisturbanceCompensator around them, and PredictiveAdrc around one without an "
       "adapter whose gain does not depend on the innovation; no other gains, adapters or "

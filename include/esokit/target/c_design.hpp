@@ -38,6 +38,8 @@ inline const std::vector<const char*> source = {
     ,
 #include <esokit/target/runtime/layers.c>
     ,
+#include <esokit/target/runtime/map.c>
+    ,
 #include <esokit/target/runtime/guard.c>
     ,
 #include <esokit/target/runtime/predictive.c>
@@ -110,6 +112,7 @@ class CDesign {
     set_constants_of_adapters();
     if (design.guard.on) set_guard();
     if (design.measured.on) set_measured();
+    set_map();
     set_rows();
     set_state();
     set_words();
@@ -173,6 +176,7 @@ class CDesign {
     text_.feature("ESOKIT_GATED_ANGLE", d.wrap.gated);
     text_.feature("ESOKIT_LAW_OF_ANGLE", d.is_controller && !d.wrap.angle.empty());
     text_.feature("ESOKIT_KNOWN", d.known.on);
+    text_.feature("ESOKIT_MAPPED", !d.map.lines.empty());
     text_.feature("ESOKIT_MEASURED", d.measured.on);
     text_.feature("ESOKIT_ONE_W", d.measured.paths.size() == 1);
     text_.feature("ESOKIT_GUARDED", d.guard.on);
@@ -274,6 +278,24 @@ class CDesign {
     text_.count("W_LENGTH", most);
     text_.count("W_MOST_LOST", measured.most_lost);
     number("FOUR_PER_W", 4.0 * count);
+  }
+
+  void set_map() {
+    const MapNumbers& map = design_.map;
+    const auto number = [&](double x) { return writer_.number(x); };
+    const auto points = [&](const std::vector<double>& of) {
+      const int count = static_cast<int>(of.size());
+      return "    {" +
+             listed(count, [&](int i) { return number(of[static_cast<std::size_t>(i)]); }) + "},\n";
+    };
+    text_.lines("DESIGN_MAP_ENDS", points(map.inputs) + points(map.effects));
+    text_.lines("DESIGN_MAP_LINES", each(static_cast<int>(map.lines.size()), [&](int i) {
+                  const auto& line = map.lines[static_cast<std::size_t>(i)];
+                  return "    {" + number(line[0]) + ", " + number(line[1]) + ", " +
+                         number(line[2]) + "},\n";
+                }));
+    text_.count("MAP_POINTS", map.inputs.size());
+    text_.count("MAP_LINES", map.lines.size());
   }
 
   /// Gains and estimates, row by row.

@@ -223,6 +223,11 @@ class FixedRecord {
       return refuse("observer", design_->measured.paths[0].gain,
                     "is in Measured, which is not written in fixed point");
     }
+    if (!design_->map.lines.empty()) {
+      return refuse("observer", design_->map.lines[0][1],
+                    "is in MappedInput, which is not written in fixed point: give u the table of "
+                    "its effect yourself");
+    }
     if (design_->known.on) {
       return refuse("observer", 0, "is in KnownModel, which is not written in fixed point");
     }

@@ -33,6 +33,7 @@ concept WatchedController = WritableController<C> && requires(const C& c) {
   requires model_traits<std::remove_cvref_t<decltype(c.observer().model())>>
   .is_chain;
   requires !observer_traits<std::remove_cvref_t<decltype(c.observer())>>.schedules_input_gain;
+  requires !observer_traits<std::remove_cvref_t<decltype(c.observer())>>.maps_input;
 };
 
 }  // namespace detail

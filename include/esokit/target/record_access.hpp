@@ -646,6 +646,29 @@ struct RecordAccess {
     return numbers;
   }
 
+  /// The curve of a MappedInput. Without a point, it gets one in the middle of its line.
+  template <class O>
+  static MapNumbers map(const O& o) {
+    const auto& map = o.map();
+    MapNumbers numbers;
+    const auto add = [&](std::size_t line) {
+      const auto& of = map.lines_[line];
+      numbers.lines.push_back({static_cast<double>(of.offset), static_cast<double>(of.slope),
+                               static_cast<double>(of.inverse)});
+    };
+    add(0);
+    for (std::size_t i = 0; i < map.inputs_.size() && is_finite(map.inputs_[i]); ++i) {
+      numbers.inputs.push_back(static_cast<double>(map.inputs_[i]));
+      numbers.effects.push_back(static_cast<double>(map.effects_[i]));
+      add(i + 1);
+    }
+    if (numbers.inputs.empty()) {
+      numbers.inputs = numbers.effects = {0.0};
+      add(0);
+    }
+    return numbers;
+  }
+
   /// The inputs of a DelayedInput that are still needed, the newest last.
   template <class O>
   static std::vector<double> line(const O& o) {

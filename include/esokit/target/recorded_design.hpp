@@ -509,6 +509,9 @@ Expected<RecordedDesign, Error<typename C::scalar_type>> recorded_design(
   take_rate(design, controller.limiter());
   take_adapters(design, controller.observer());
   design.law = Access::law_numbers(Access::core(bare.observer()));
+  if (design.softens && !design.map.lines.empty()) {
+    return Error<V>{"soften", V(1), "is not written for a controller around MappedInput"};
+  }
 
   if (auto ok = record_controller(maker); !ok) return ok.error();
   if (design.error_based) design.input_gain = -design.input_gain;

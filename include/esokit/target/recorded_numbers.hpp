@@ -154,6 +154,13 @@ struct KnownNumbers {
   bool around_angle = false;  ///< a WrappedOutput is inside
 };
 
+/// The curve of a MappedInput, with at least a point.
+struct MapNumbers {
+  std::vector<double> inputs{};
+  std::vector<double> effects{};
+  std::vector<std::array<double, 3>> lines{};  ///< offset, slope and inverse, one more
+};
+
 /// A finished design as lists and counts, without its type.
 struct RecordedDesign {
   CodeOptions options{};
@@ -179,6 +186,7 @@ struct RecordedDesign {
   GuardNumbers guard{};
   MeasuredNumbers measured{};
   KnownNumbers known{};
+  MapNumbers map{};
   int max_gap = 0;  ///< missing samples that are bridged
   LoopRules loop{};
   double lower = 0;

@@ -5,6 +5,7 @@
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/guarded.hpp>
 #include <esokit/adapter/known_model.hpp>
+#include <esokit/adapter/mapped_input.hpp>
 #include <esokit/adapter/measured.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
@@ -49,9 +50,13 @@ struct IsKnown : std::false_type {};
 template <class Observer, class Model>
 struct IsKnown<KnownModel<Observer, Model>> : std::true_type {};
 template <class Observer>
+struct IsMapped : std::false_type {};
+template <class Observer, int Points>
+struct IsMapped<MappedInput<Observer, Points>> : std::true_type {};
+template <class Observer>
 inline constexpr bool is_adapter =
     IsDelayed<Observer>::value || IsGate<Observer>::value || IsWrapped<Observer>::value ||
-    IsGuarded<Observer>::value || IsMeasured<Observer>::value;
+    IsGuarded<Observer>::value || IsMeasured<Observer>::value || IsMapped<Observer>::value;
 /// Told at one place, and inside a WrappedOutput: around it the angle is read otherwise.
 template <class Observer>
 inline constexpr bool measures_plainly = [] {
@@ -74,6 +79,7 @@ void take_adapters(RecordedDesign& design, const Observer& observer) {
   if constexpr (IsGate<Observer>::value) design.gate = RecordAccess::gate(observer);
   if constexpr (IsGuarded<Observer>::value) design.guard = RecordAccess::guard(observer);
   if constexpr (IsWrapped<Observer>::value) design.wrap = RecordAccess::wrap(observer);
+  if constexpr (IsMapped<Observer>::value) design.map = RecordAccess::map(observer);
   if constexpr (IsMeasured<Observer>::value) design.measured = RecordAccess::measured(observer);
   if constexpr (IsKnown<Observer>::value) {
     design.known = {true, observer_traits<typename Observer::Adapted>.wraps_output};
@@ -102,6 +108,10 @@ struct WithoutAdapter<WrappedOutput<Observer>> {
 };
 template <class Observer>
 struct WithoutAdapter<Guarded<Observer>> {
+  using type = typename WithoutAdapter<Observer>::type;
+};
+template <class Observer, int Points>
+struct WithoutAdapter<MappedInput<Observer, Points>> {
   using type = typename WithoutAdapter<Observer>::type;
 };
 template <class Observer, int Count, int Delay>
@@ -181,10 +191,22 @@ template <class Observer>
 inline constexpr bool knows_in_general<DisturbanceCompensator<Observer>> =
     knows_in_general<Observer>;
 
+/// What the curve of an actuator is around.
+template <class Observer>
+struct InMapOf {
+  using type = Observer;
+};
+template <class Observer, int Points>
+struct InMapOf<MappedInput<Observer, Points>> {
+  using type = Observer;
+};
+template <class Observer>
+using InMap = typename InMapOf<Observer>::type;
+
 /// The same, perhaps in an adapter.
 template <class Observer>
 concept WritableObserver = HasLists<typename WithoutAdapter<Observer>::type> &&
-    measures_plainly<Observer> && RecordAccess::guards_a_chain<Observer>;
+    measures_plainly<Observer> && RecordAccess::guards_a_chain<InMap<Observer>>;
 
 template <class C>
 struct ObserverOfController;

@@ -18,6 +18,37 @@ R"esokit("
 #define observe_restart restart_plain
 #endif
 #endif
+#if ESOKIT_MAPPED
+/* ---- All of it is told the effect of u. */
+
+static unsigned update_mapped(esokit_state *o, real y, real u)
+{
+  return observe_update(o, y, effect_of(u));
+}
+
+static unsigned predict_mapped(esokit_state *o, real u)
+{
+  return observe_predict(o, effect_of(u));
+}
+
+#if ESOKIT_CONTROLLER
+static bool rest_mapped(esokit_state *o, real y, real u)
+{
+  return observe_rest(o, y, effect_of(u));
+}
+
+/* The u with an effect that may have none. */
+static real finite_input_for(real effect)
+{
+  const real u = input_for(effect);
+  return is_finite(u) ? u : ((u < 0.0) ? -LARGEST : LARGEST);
+}
+
+#endif
+#define observe_update update_mapped
+#define observe_predict predict_mapped
+#define observe_rest rest_mapped
+#endif
 #if ESOKIT_CONTROLLER
 /* The last u of update, or what was commanded elsewhere since. */
 static real commanded(const esokit_state *o)
@@ -65,6 +96,9 @@ static real wanted(esokit_state *o, real r)
 #endif
 #if ESOKIT_GUARDED && !ESOKIT_SOFTENS && !ESOKIT_COMPENSATOR
   u = u * o->input_factor;
+#endif
+#if ESOKIT_MAPPED
+  u = input_for(u);
 #endif
   return u;
 }
@@ -155,7 +189,11 @@ unsigned esokit_start(esokit_state *o, real y, real u)
   }
 #endif
   before = *o;
-#if ESOKIT_DELAYED && ESOKIT_GUARDED
+#if ESOKIT_DELAYED && ESOKIT_MAPPED && ESOKIT_GUARDED
+  fill_delayed(o, effect_of(u) * o->gain_ratio);
+#elif ESOKIT_DELAYED && ESOKIT_MAPPED
+  fill_delayed(o, effect_of(u));
+#elif ESOKIT_DELAYED && ESOKIT_GUARDED
   fill_delayed(o, u * o->gain_ratio);
 #elif ESOKIT_DELAYED
   fill_delayed(o, u);
@@ -191,7 +229,11 @@ static void rest_again(esokit_state *o, real measured)
 #else
   const real held = o->u_applied;
 #endif
+#if ESOKIT_MAPPED
+  const bool rests = observe_rest(o, measured, finite_input_for(held));
+#else
   const bool rests = observe_rest(o, measured, held);
+#endif
 #if ESOKIT_GATED
   if (rests) {
     gate_set(o, true);
@@ -285,7 +327,11 @@ static real hold_sample(esokit_state *o, real measured, real u)
   }
 #endif
   o->elsewhere = 1u;
+#if ESOKIT_MAPPED
+  given = input_for(hold_guards(o));
+#else
   given = hold_guards(o);
+#endif
 #if ESOKIT_DIVIDED
   if (o->phase != 0u) {
     skip_sample(o, given);

@@ -281,7 +281,11 @@ static bool rest_guarded(esokit_state *o, real y, real u)
 #else
 real esokit_hold(esokit_state *o)
 {
+#if ESOKIT_MAPPED
+  return input_for(hold_guards(o));
+#else
   return hold_guards(o);
+#endif
 }
 
 void esokit_release(esokit_state *o)

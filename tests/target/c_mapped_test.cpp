@@ -1,0 +1,86 @@
+// The C of what the curve of an actuator is around equals it bit for bit, and what is refused.
+#include <esokit/adapter/delayed_input.hpp>
+#include <esokit/adapter/guarded.hpp>
+#include <esokit/adapter/mapped_input.hpp>
+#include <esokit/adapter/measured.hpp>
+#include <esokit/adapter/outlier_gate.hpp>
+#include <esokit/adapter/wrapped_output.hpp>
+#include <esokit/control/disturbance_compensator.hpp>
+#include <esokit/control/health.hpp>
+#include <esokit/observer/model_eso.hpp>
+#include <esokit/target/fixed_point.hpp>
+#include <esokit/target/health_code.hpp>
+#include <support/refusal.hpp>
+#include <target/written.hpp>
+
+namespace esokit_test {
+namespace target_c_mapped_test {
+
+using namespace esokit;
+using detail::Writable;
+
+using Mapped = MappedInput<LinearEso<2, double>>;
+
+static_assert(Writable<Mapped> && Writable<Adrc<Mapped>> &&
+              Writable<MappedInput<Guarded<LinearEso<2>>>>);
+// Its first phase is one list.
+static_assert(!Writable<PredictiveAdrc<Mapped>>);
+static_assert(detail::WatchedController<Adrc<LinearEso<2>>> &&
+              !detail::WatchedController<Adrc<Mapped>>);
+
+TEST(CMapped, SaysWhatItDoesNotWrite) {
+  using Third = Adrc<MappedInput<LinearEso<3>>>;
+  EXPECT_EQ(refusal(to_c(Third::make(config<Third>(8)).value(), {})),
+            "soften: is not written for a controller around MappedInput");
+  auto hard = config<Third>(8);
+  hard.soften = false;
+  EXPECT_TRUE(to_c(Third::make(hard).value(), {}).has_value());
+  FixedPointOptions counts{};
+  counts.y = counts.u = {.unit = 1e-3, .most = 4000};
+  const auto fixed = to_fixed_c(Adrc<Mapped>::make(config<Adrc<Mapped>>(8)).value(), counts);
+  EXPECT_EQ(refusal(fixed),
+            "observer: is in MappedInput, which is not written in fixed point: give u the table of "
+            "its effect yourself");
+}
+
+#if defined(ESOKIT_LOADS_C) && !defined(ESOKIT_ONE_TYPE)
+
+/// Of a curve without a point, with one, and with as many as there may be.
+TEST(CMapped, OfAnyCurve) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  const auto with = [](const auto& curve, auto seed) {
+    using V = std::remove_cvref_t<decltype(curve.slope_below)>;
+    equals_changed<Adrc<MappedInput<LinearEso<2, V>>>>(
+        30000, static_cast<std::uint64_t>(seed), "gcc -std=c99",
+        [&](auto& settings) { settings.observer.curve = curve; });
+  };
+  with(ActuatorCurve<float>{.slope_above = 0.75F}, 1401);
+  with(ActuatorCurve<float>::two_gains(1.5F, 0.3F), 1411);
+  with(ActuatorCurve<double>::square(3), 1421);
+  with(ActuatorCurve<double>::from_table<4>({-3, -1, 0.5, 2}, {-2, -1.5, 0.25, 2.5}), 1431);
+}
+
+TEST(CMapped, AroundWhatItMayBe) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  equals<MappedInput<LinearEso<1, float>>>(30000, 1301);
+  equals<MappedInput<DelayedInput<OutlierGate<LinearEso<2, double>>, 3>>>(30000, 1311);
+  equals<MappedInput<WrappedOutput<LinearEso<2, float>>>>(30000, 1321);
+  equals_controller<Adrc<MappedInput<ModelEso<lag, double>>, ErrorBased>>(30000, 1331,
+                                                                          "gcc -std=c99", 2);
+  equals_controller<DisturbanceCompensator<MappedInput<Measured<LinearEso<1, double>, 1, 4>>>>(
+      30000, 1341);
+  equals<MappedInput<Guarded<DelayedInput<LinearEso<2, double>, 3>>>>(30000, 1351);
+  equals_controller<Adrc<MappedInput<Guarded<LinearEso<1, float>>>, ErrorBased>>(30000, 1361);
+  observes<MappedInput<LinearEso<2, float>>>(30000, 1371);
+  observes<MappedInput<Guarded<CascadeEso<1, 2, double>>>>(30000, 1381);
+}
+
+TEST(CMapped, CompilesWithOtherCompilers) {
+  compiles<Adrc<MappedInput<LinearEso<2, float>>>>();
+  compiles<DisturbanceCompensator<MappedInput<Guarded<DelayedInput<LinearEso<1, double>, 3>>>>>();
+}
+
+#endif
+
+}  // namespace target_c_mapped_test
+}  // namespace esokit_test
