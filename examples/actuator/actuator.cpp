@@ -116,7 +116,7 @@ void draw(Report& report, const char* name, const char* caption, const char* y_l
           const char* u_label, const Trace& without, const Trace& with) {
   Figure figure(name, {.rows = 1, .columns = 2, .panel_height = 200});
   figure.caption(caption);
-  const auto panel = [&](int column, const char* label, const auto& of) {
+  const auto panel = [&](std::size_t column, const char* label, const auto& of) {
     figure.panel(0, column)
         .x_label("t (s)")
         .y_label(label)
@@ -163,20 +163,22 @@ void peltier(Report& report) {
   (void)loops.without.start(25, 0);
   (void)loops.with.start(25, 0);
   const auto room = [](double) { return 25.0; };
-  const auto loads = [](double t) { return t < 10 ? 0 : t < 50 ? -0.1 : t < 90 ? 0.1 : 0; };
+  const auto loads = [](double t) {
+    return t >= 10 && t < 40 ? -0.1 : t >= 70 && t < 100 ? 0.1 : 0.0;
+  };
   const Trace without = run(loops.without, Peltier{}, 120, room, loads);
   const Trace with = run(loops.with, Peltier{}, 120, room, loads);
   const Trace even = run(loops.without, Peltier{.cooling = 1}, 120, room, loads);
-  const auto warm = [](const Trace& trace) { return furthest(trace, 25, 50, 90); };
-  const auto cold = [](const Trace& trace) { return furthest(trace, 25, 10, 50); };
+  const auto warm = [](const Trace& trace) { return furthest(trace, 25, 70, 100); };
+  const auto cold = [](const Trace& trace) { return furthest(trace, 25, 10, 40); };
   report.expect("peltier, load 0.1 K/s", "error without (K)", warm(without), true, "");
   report.expect("peltier, load 0.1 K/s", "error with (K)", warm(with),
                 std::abs(warm(with) / warm(even) - 1) < 0.1, "as with one gain, within 10 %");
   report.expect("peltier, load 0.1 K/s", "error with one gain (K)", warm(even), true, "");
   report.expect("peltier, load -0.1 K/s", "error with (K)", cold(with), true, "");
   draw(report, "peltier",
-       "A Peltier element that cools 0.3 times as much as it heats: a loss from 10 s on, heat from "
-       "50 s on.",
+       "A Peltier element that cools 0.3 times as much as it heats: a loss from 10 to 40 s, heat "
+       "from 70 to 100 s.",
        "temperature (degC)", "u", without, with);
 }
 

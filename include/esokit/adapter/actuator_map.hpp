@@ -31,8 +31,8 @@ struct ActuatorCurve {
   ///
   /// Its inverse would jump at zero, and noise with it: here an effect below `softness` is a line
   /// of the slope 1 + width / softness. So noise that asks for an effect e moves u by that times e,
-  /// and never by more than 2 (width + softness). Give the largest width that there may be: of one
-  /// that is smaller a loop knows little (examples/actuator).
+  /// and never by more than 2 (width + softness). Give the largest width that there may be:
+  /// a smaller dead zone leaves a chatter, a larger one is a dead zone again (examples/actuator).
   /// @param width above 0, unit of u @param softness above 0, unit of u
   static constexpr ActuatorCurve dead_zone(const S& width, const S& softness) noexcept {
     ActuatorCurve curve;
