@@ -160,6 +160,9 @@ detail::RecordedDesign design_of(Random& random) {
     d.loop.divider = is() ? 3 : 1;
     d.softens = !d.compensates && is();
   }
+  if (!d.predictive && !d.softens && is()) {
+    d.map = {{-3, 3}, {-0.5, 0.5}, {{2.5, 1, 1}, {0, 0.125, 8}, {-2.5, 1, 1}}};
+  }
   d.options.settings_in_struct = !d.predictive && stands && d.gain_is_kept && !d.softens && is();
   if (d.options.settings_in_struct) d.settings.assign(d.members.size(), false);
   for (const char* call : calls) add_call(d, call);

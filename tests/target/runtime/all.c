@@ -9,6 +9,7 @@
 #include <esokit/target/runtime/core.c>
 #include <esokit/target/runtime/angle.c>
 #include <esokit/target/runtime/layers.c>
+#include <esokit/target/runtime/map.c>
 #include <esokit/target/runtime/guard.c>
 #include <esokit/target/runtime/predictive.c>
 #include <esokit/target/runtime/controller.c>

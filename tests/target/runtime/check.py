@@ -26,7 +26,7 @@ OF_LOOPS = ["DIVIDED", "STAYS_SAFE", "HOLDS_SAFE", "SOFTENS", "MONITORED"]
 GUARDS = [set(), {"GUARDED"}, {"GUARDED", "BOUNDED"}, {"GUARDED", "LEAKS"}, {"GUARDED", "BOUND_OF_U"},
           {"GUARDED", "BOUNDED", "BOUND_OF_U", "LEAKS"}]
 W = [set(), {"MEASURED", "ONE_W"}, {"MEASURED"}]
-FLAGS = OF_LOOPS + ["HOLDS_AT_START", "SETTINGS", "DELAYED", "GATED", "WRAPPED", "KNOWN", "SINGLE"]
+FLAGS = OF_LOOPS + ["HOLDS_AT_START", "SETTINGS", "DELAYED", "GATED", "WRAPPED", "KNOWN", "MAPPED", "SINGLE"]
 DEVIATIONS = ("2.5", "15.5", "21.15")
 ALL = sorted({*FLAGS, "GATED_ANGLE", "LAW_OF_ANGLE"}.union(*KINDS, *LAWS, *GUARDS, *W))
 
@@ -40,10 +40,11 @@ def valid(has):
          ({"STAYS_SAFE", "HOLDS_SAFE"} if "PREDICTIVE" in has else set()))
         or ("HOLDS_AT_START" in has and not loop and "PREDICTIVE" not in has)
         or ("PREDICTIVE" in has and (has & {"DELAYED", "GATED", "WRAPPED", "KNOWN", "MEASURED", "GUARDED",
-                                            "SETTINGS"} or ("TABLE" in has and not kept)))
+                                            "MAPPED", "SETTINGS"} or ("TABLE" in has and not kept)))
         or ("GUARDED" in has and (not kept or "MEASURED" in has))
         or ("SETTINGS" in has and (not kept or "SOFTENS" in has))
         or ("SOFTENS" in has and "COMPENSATOR" in has)
+        or {"MAPPED", "SOFTENS"} <= has
         or ("KNOWN" in has and "SCHEDULE" in has)
         or ("WATCHED" in has and "GATED" in has))
 

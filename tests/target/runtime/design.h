@@ -75,6 +75,12 @@ typedef double real;
 #define W_LENGTH 4u
 #define W_MOST_LOST 7u
 #define FOUR_PER_W number(8.0)
+#define MAP_POINTS 2u
+#define MAP_LINES 3u
+#define DESIGN_MAP_ENDS {number(-3.0), number(3.0)}, {number(-0.5), number(0.5)}
+#define DESIGN_MAP_LINES \
+  {number(2.5), number(1.0), number(1.0)}, {number(0.0), number(0.125), number(8.0)}, \
+    {number(-2.5), number(1.0), number(1.0)}
 #define SAMPLE_TIME number(0.01)
 #define LARGEST number(1e30)
 #define GAINS 3

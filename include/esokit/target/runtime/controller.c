@@ -2,16 +2,16 @@
 R"esokit("
 #endif
 #if ESOKIT_GUARDED
-#define observe_update update_guarded
-#define observe_predict predict_guarded
+#define inner_update update_guarded
+#define inner_predict predict_guarded
+#define inner_rest rest_guarded
 #define observe_correct correct_guarded
-#define observe_rest rest_guarded
 #define observe_restart restart_guarded
 #else
-#define observe_update update_outside
-#define observe_predict predict_outside
+#define inner_update update_outside
+#define inner_predict predict_outside
+#define inner_rest rest_outside
 #define observe_correct correct_outside
-#define observe_rest rest_outside
 #if ESOKIT_WRAPPED
 #define observe_restart restart
 #else
@@ -19,22 +19,22 @@ R"esokit("
 #endif
 #endif
 #if ESOKIT_MAPPED
-/* ---- All of it is told the effect of u. */
+/* ---- What is inside is told the effect of u. */
 
 static unsigned update_mapped(esokit_state *o, real y, real u)
 {
-  return observe_update(o, y, effect_of(u));
+  return inner_update(o, y, effect_of(u));
 }
 
 static unsigned predict_mapped(esokit_state *o, real u)
 {
-  return observe_predict(o, effect_of(u));
+  return inner_predict(o, effect_of(u));
 }
 
 #if ESOKIT_CONTROLLER
 static bool rest_mapped(esokit_state *o, real y, real u)
 {
-  return observe_rest(o, y, effect_of(u));
+  return inner_rest(o, y, effect_of(u));
 }
 
 /* The u with an effect that may have none. */
@@ -48,6 +48,14 @@ static real finite_input_for(real effect)
 #define observe_update update_mapped
 #define observe_predict predict_mapped
 #define observe_rest rest_mapped
+#elif ESOKIT_GUARDED
+#define observe_update update_guarded
+#define observe_predict predict_guarded
+#define observe_rest rest_guarded
+#else
+#define observe_update update_outside
+#define observe_predict predict_outside
+#define observe_rest rest_outside
 #endif
 #if ESOKIT_CONTROLLER
 /* The last u of update, or what was commanded elsewhere since. */
