@@ -69,6 +69,10 @@ esokit::FitData simulated(const Identified& found, const esokit::FitData& rows) 
 
 std::string percent(double share) { return number_text(100 * share, 3) + " %"; }
 
+std::string overshoot_text(const StepOfCode& step) {
+  return step.overshoot < 1e-4 ? "does not overshoot" : "overshoots by " + percent(step.overshoot);
+}
+
 /// Who wins, in words: J is what everything was tuned for.
 std::string against_pid(const std::vector<esokit::TunedRival>& rivals,
                         const esokit::TunedDesign& taken) {
@@ -232,16 +236,14 @@ Design Design::make(const Settings& settings, const Input& input, const Findings
   for (const auto& alarm : esokit::alarms(*tuning, taken))
     design.alarms_.push_back({alarm.name, alarm.text});
   // Of order 1 no further than u holds against the pole.
-  const StepOfCode step = step_of_code(
-      design.pasting_, *tuning, taken,
-      esokit::play_distance(model, 1.0, esokit::play_events.back()),
-      std::min(10 * taken.settling_time + 300 * model.latency(), 200'000.0 * T), 0.0, 0);
+  const double duration = std::min(10 * taken.settling_time + 300 * model.latency(), 200'000.0 * T);
+  const StepOfCode step =
+      step_of_code(design.pasting_, *tuning, taken,
+                   esokit::play_distance(model, 1.0, esokit::play_events.back()), duration, 0.0, 0);
   design.summary_ = {
       "Chosen: " + taken.name + ". A step of the reference by " + number_text(step.height, 3) +
-          ", through the profile of the code, settles in " + number_text(step.settling, 3) +
-          " s and " +
-          (step.overshoot < 1e-4 ? "does not overshoot"
-                                 : "overshoots by " + percent(step.overshoot)) +
+          ", through the profile of the code, settles in " + duration_text(step.settling) +
+          " and " + overshoot_text(step) +
           ", within the limits of u. A load step that takes a tenth of the range of u moves y by "
           "at most " +
           number_text(0.1 * range * taken.load_peak, 3) +
@@ -255,6 +257,12 @@ Design Design::make(const Settings& settings, const Input& input, const Findings
           " times those of the best linear controller, which keeps no margins."};
   design.rivals_ = esokit::tune_rivals(*tuning);
   design.summary_.push_back(against_pid(design.rivals_, taken));
+  if (const auto& best = design.rivals_.front(); best.design.feasible) {
+    const StepOfCode bare = step_of_pid(design.pasting_, model, best.pid, step.height, duration);
+    design.summary_.push_back("The same step, given at once to the " + best.design.name +
+                              ", settles in " + duration_text(bare.settling) + " and " +
+                              overshoot_text(bare) + ".");
+  }
   if (settings.pid) {
     const auto given = esokit::given_rival(*tuning, *settings.pid);
     if (!given) throw LogError("--pid: " + esokit::to_text(given.error()));

@@ -618,28 +618,24 @@ double Runner::update(double y, double target, const std::vector<double>& w) {
   return u;
 }
 
-StepOfCode step_of_code(const Pasting& pasting, const Tuning& tuning, const TunedDesign& design,
-                        double height, double duration, double noise, int digits,
-                        const Acting* measured) {
-  const TuneModel& model = tuning.model;
+namespace {
+
+/// A step on the machine that was found. @param control u of (y, target), and what of it the
+/// machine does not feel, as what is measured acts the other way
+template <class Control>
+StepOfCode simulated_step(const Pasting& pasting, const TuneModel& model, double height,
+                          double duration, double noise, int digits, const Acting* measured,
+                          Control&& control) {
   const double T = model.sample_time;
-  Runner runner(pasting, tuning, design);
-  runner.start(pasting.start_y, pasting.start_u);
   StepOfCode step;
   step.height = height;
   esokit::sim::Gaussian gaussian(7);
   const auto controller = [&](double y, double) {
     const bool on = static_cast<int>(step.y.size()) >= (digits > 0 ? still : 0);
     step.y.push_back(y);
-    std::vector<double> w;
-    const std::size_t k = step.y.size() - 1;
-    for (std::size_t i = 0; i < pasting.feeds.size(); ++i) {
-      if (measured != nullptr) w.push_back(measured->w[i][std::min(k, measured->w[i].size() - 1)]);
-      if (digits > 0) w.push_back(checked_w(pasting.feeds[i], static_cast<int>(k)));
-    }
-    step.u.push_back(runner.update(y, pasting.start_y + (on ? height : 0.0), w));
-    // What is measured acts as u without it does.
-    return step.u.back() - (measured == nullptr ? runner.fed() : 0.0);
+    const auto [u, fed] = control(y, pasting.start_y + (on ? height : 0.0));
+    step.u.push_back(u);
+    return u - fed;
   };
   const auto plant = machine(pasting, model, measured);
   auto rest = MachineState::Zero();
@@ -668,6 +664,41 @@ StepOfCode step_of_code(const Pasting& pasting, const Tuning& tuning, const Tune
     step.overshoot = std::max(step.overshoot, at - 1);
   }
   return step;
+}
+
+}  // namespace
+
+StepOfCode step_of_code(const Pasting& pasting, const Tuning& tuning, const TunedDesign& design,
+                        double height, double duration, double noise, int digits,
+                        const Acting* measured) {
+  Runner runner(pasting, tuning, design);
+  runner.start(pasting.start_y, pasting.start_u);
+  std::size_t k = 0;
+  return simulated_step(pasting, tuning.model, height, duration, noise, digits, measured,
+                        [&](double y, double target) {
+                          std::vector<double> w;
+                          for (std::size_t i = 0; i < pasting.feeds.size(); ++i) {
+                            if (measured != nullptr) {
+                              const auto& all = measured->w[i];
+                              w.push_back(all[std::min(k, all.size() - 1)]);
+                            }
+                            if (digits > 0)
+                              w.push_back(checked_w(pasting.feeds[i], static_cast<int>(k)));
+                          }
+                          ++k;
+                          const double u = runner.update(y, target, w);
+                          // What is measured acts as u without it does.
+                          return std::pair(u, measured == nullptr ? runner.fed() : 0.0);
+                        });
+}
+
+StepOfCode step_of_pid(const Pasting& pasting, const esokit::TuneModel& model,
+                       const esokit::PlainPidConfig& config, double height, double duration) {
+  auto pid = esokit::PlainPid::make(config).value();
+  pid.start(pasting.start_y, pasting.start_y, pasting.start_u);
+  return simulated_step(
+      pasting, model, height, duration, 0.0, 0, nullptr,
+      [&](double y, double target) { return std::pair(pid.update(y, target), 0.0); });
 }
 
 std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesign& design,

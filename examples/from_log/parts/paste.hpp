@@ -176,6 +176,11 @@ struct Acting {
                                       double duration, double noise, int digits,
                                       const Acting* measured = nullptr);
 
+/// The same of a PID, whose reference steps at once.
+[[nodiscard]] StepOfCode step_of_pid(const Pasting& pasting, const esokit::TuneModel& model,
+                                     const esokit::PlainPidConfig& config, double height,
+                                     double duration);
+
 /// C++ that compiles as it is. @param rows the log, as of `told_rows`
 [[nodiscard]] std::string pasted_code(const Pasting& pasting, const esokit::Tuning& tuning,
                                       const esokit::TunedDesign& design,
