@@ -99,6 +99,17 @@ TEST(CCode, OfWhatIsSafe) {
   }
 }
 
+/// The first missing measurement is one too many, with each and with every second sample measured.
+TEST(CCode, OfNoneMissing) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  for (const int divider : {1, 2}) {
+    equals_changed<Adrc<LinearEso<2, double>>>(20000, 151, "gcc -std=c99", [=](auto& settings) {
+      settings.missing.most = 0;
+      settings.measurement_divider = divider;
+    });
+  }
+}
+
 TEST(CCode, ByClang) {
   if (!there("clang")) GTEST_SKIP() << "no clang";
   equals<LinearEso<2, float>>(20000, 131, "clang -std=c99 -ffp-contract=off");

@@ -76,18 +76,76 @@ TEST(CGuarded, OfPinHoldAndGain) {
   equals<Guarded<LinearEso<3, double>>>(30000, 921);  // it softens: no changing b0
 }
 
-/// A fast pair beside slow poles is proven only with corrections frozen for 70 samples after a
+using Settling = Guarded<LinearEso<2, double, 1, PoleSet>>;
+void pair(Adrc<Settling>::Config& settings) {
+  auto& observer = settings.observer.observer;
+  observer.poles[0] = -20;
+  observer.poles[1] = {-3, 20};
+  observer.poles[2] = {-3, -20};
+}
+
+/// A fast pair beside slow poles is proven only with corrections frozen for 302 samples after a
 /// hold.
 TEST(CGuarded, FrozenAfterAHold) {
   if (!there("gcc")) GTEST_SKIP() << "no gcc";
-  using Settling = Guarded<LinearEso<2, double, 1, PoleSet>>;
-  const auto pair = [](auto& settings) {
-    auto& observer = settings.observer.observer;
-    observer.poles[0] = -20;
-    observer.poles[1] = {-3, 20};
-    observer.poles[2] = {-3, -20};
-  };
   equals_changed<Adrc<Settling>>(30000, 931, "gcc -std=c99", pair);
+}
+
+/// Also where corrections begin to be weighed just before these samples end.
+TEST(CGuarded, PinnedAtTheEndOfSettling) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  using C = Adrc<Settling>;
+  auto settings = config<C>(8);
+  pair(settings);
+  const C made = C::make(settings).value();
+  const Folder folder;
+  InC<double> in_c(folder, to_c(made, {.name = "loop"}).value(), true);
+  ASSERT_TRUE(in_c.loaded());
+  const auto fresh = in_c.state();
+  for (int pinned = 290; pinned < 310; ++pinned) {
+    C controller = made;
+    in_c.state() = fresh;
+    for (int k = 0; k < 450; ++k) {
+      const double y = std::sin(0.05 * k);
+      if (k == 3 + pinned) {
+        controller.observer().set_pin(Pin::upper);
+        in_c.set_pin(Pin::upper);
+      }
+      const bool holds = k < 3;
+      const double u = holds ? controller.hold(y, 0, 0.5) : controller.update(y, 0);
+      EXPECT_TRUE(equal_bits(u, holds ? in_c.hold(y, 0.5) : in_c.update(y, 0)))
+          << pinned << ", sample " << k;
+    }
+  }
+}
+
+/// A u that the present b0 makes larger than a number can be has a side, too; zero has none.
+TEST(CGuarded, PinnedUnderTheLargestAndNoInput) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  using C = Adrc<Guarded<LinearEso<2, double>>>;
+  const C made = C::make(config<C>(8)).value();
+  const Folder folder;
+  InC<double> in_c(folder, to_c(made, {.name = "loop"}).value(), true);
+  ASSERT_TRUE(in_c.loaded());
+  const auto fresh = in_c.state();
+  for (const double u : {1.5e308, -1.5e308, 0.0}) {
+    C controller = made;
+    in_c.state() = fresh;
+    for (int k = 0; k < 50; ++k) {
+      if (k == 3) {
+        EXPECT_EQ(controller.applied(u), StepStatus::ok);
+        EXPECT_EQ(in_c.applied(u), 0u);
+      }
+      if (k == 4) {
+        EXPECT_TRUE(controller.set_input_gain(4));
+        EXPECT_TRUE(in_c.set_input_gain(4));
+        controller.observer().set_pin(Pin::either);
+        in_c.set_pin(Pin::either);
+      }
+      EXPECT_TRUE(equal_bits(controller.update(0.1, 0), in_c.update(0.1, 0))) << u << " " << k;
+      compare_estimates(controller.observer(), in_c, k);
+    }
+  }
 }
 
 TEST(CGuarded, CompilesWithOtherCompilers) {

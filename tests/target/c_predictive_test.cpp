@@ -113,10 +113,14 @@ void predicts(
       if (random.index(100) == 0) y = random.index(2) == 0 ? hidden_nan<V>() : anything<V>(random);
       const V held =
           random.index(10) == 0 ? anything<V>(random) : static_cast<V>(random.uniform(-2, 2));
+      const auto tell = [&](V told) {
+        EXPECT_EQ(static_cast<unsigned>(mine.applied(told)), in_c.applied(told)) << k;
+        if (is_finite(told)) drive = told;
+      };
       const auto report = [&] {
         if (random.index(40) != 0) return;
-        EXPECT_EQ(static_cast<unsigned>(mine.applied(held)), in_c.applied(held)) << k;
-        if (is_finite(held)) drive = held;
+        if (random.index(2) == 0) tell(static_cast<V>(random.uniform(-3, 3)));  // and again
+        tell(held);
       };
       const V u = lost > 0 ? mine.control_without_measurement() : mine.control(y);
       const V of_c = lost > 0 ? in_c.without() : in_c.control(y);
@@ -135,6 +139,7 @@ void predicts(
       if (random.index(2000) == 0) {
         EXPECT_EQ(static_cast<unsigned>(mine.start(y, held)), in_c.start(y, held)) << k;
         if (random.index(2) == 0) lost = 2;  // the first sample is missing
+        if (random.index(2) == 0) tell(static_cast<V>(random.uniform(-3, 3)));  // the operator
       }
       if (random.index(2000) == 0) {
         EXPECT_EQ(static_cast<unsigned>(mine.reset(y)), in_c.reset(y)) << k;

@@ -74,6 +74,20 @@ void equals_profile(std::uint64_t seed, S shortest_time = S(0)) {
   }
   EXPECT_GT(finished, 40);
   EXPECT_GT(refused, 40);
+  // Which way is too far: to the last digit.
+  const auto accepts = [&](S to) {
+    EXPECT_TRUE(mine.reset(S(0)) && reset(&its, S(0)));
+    const bool good = mine.update(to);
+    EXPECT_EQ(good, update(&its, to)) << to;
+    return good;
+  };
+  S good(1);
+  S bad(1);
+  while (accepts(bad)) bad = bad * S(2);
+  for (S middle = bad / 2; good < middle && middle < bad; middle = good + (bad - good) / 2) {
+    (accepts(middle) ? good : bad) = middle;
+  }
+  EXPECT_GT(good, S(1));
 }
 
 TEST(ProfileCode, EqualsTheProfile) {

@@ -89,7 +89,8 @@ inline CCode c_code(const RecordedDesign& design) {
 /// std::sin;`. A branch on a value does not compile: `select(condition, a, b)` chooses.
 ///
 /// SmoothProfile and HealthMonitor: target/profile_code.hpp and target/health_code.hpp.
-/// @param object as `make` returned it, or running, after a good sample: `init` begins in its state,
+/// @param object as `make` returned it, or running, after a good sample: `init` begins in its
+/// state,
 ///        a `start` or report since included. A gap that runs, safe mode and a sample without a
 ///        measurement that is due are not kept
 /// @return error for a name that is no identifier, a comment that would end the one it stands in, a
