@@ -31,13 +31,16 @@ struct ExtensionOf<Observer> {
   static constexpr int extension = Observer::extension;  ///< m, extended states
 };
 
+/// Of the config of an adapter: whether it goes around Guarded, too, and has its members.
+template <class Settings>
+inline constexpr bool goes_around_guards = false;
+
 }  // namespace detail
 
 /// Base of the adapters: forwards the members of the observer whose result no adapter changes. An
 /// adapter adds make, retune, update, predict, correct and reset, redefines members whose result
 /// differs, and deletes those that it cannot offer.
-/// @tparam AroundGuards it goes around Guarded, too, and has its members
-template <class Observer, bool AroundGuards = false>
+template <class Observer>
 requires(detail::goes_into_a_loop<Observer>()) class Adapter
     : public detail::LevelsOf<Observer>,
       public detail::ExtensionOf<Observer> {
@@ -190,8 +193,6 @@ requires(detail::goes_into_a_loop<Observer>()) class Adapter
 
   // Last, because after a failed assertion the members below it would be missing in derived
   // classes.
-  static_assert(AroundGuards || !observer_traits<Observer>.schedules_input_gain,
-                "esokit: Guarded must be the outermost adapter");
   static_assert(!observer_traits<Observer>.maps_input,
                 "esokit: MappedInput must be the outermost adapter, also of Guarded");
 };
@@ -202,9 +203,9 @@ requires(detail::goes_into_a_loop<Observer>()) class Adapter
 /// its own; or, if they may be refused, `take(fresh, before)`, which returns a Check and is called
 /// of a copy. `before` is the adapter with all its old settings.
 /// @tparam Self the adapter @tparam Settings its Config
-template <class Self, LoopObserver Observer, class Settings, bool AroundGuards = false>
-class NamedAdapter : public Adapter<Observer, AroundGuards> {
-  using Base = Adapter<Observer, AroundGuards>;
+template <class Self, LoopObserver Observer, class Settings>
+class NamedAdapter : public Adapter<Observer> {
+  using Base = Adapter<Observer>;
 
  public:
   using Config = Settings;                         ///< settings of make
@@ -259,6 +260,10 @@ class NamedAdapter : public Adapter<Observer, AroundGuards> {
 
  protected:
   using Base::Base;
+
+  static_assert(detail::goes_around_guards<Settings> ||
+                    !observer_traits<Observer>.schedules_input_gain,
+                "esokit: Guarded must be the outermost adapter");
 };
 
 }  // namespace esokit

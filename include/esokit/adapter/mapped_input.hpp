@@ -20,6 +20,13 @@ requires(detail::goes_into_a_loop<Observer>()) struct MappedInputConfig {
   ActuatorCurve<S, Points> curve{};      ///< of the actuator
 };
 
+namespace detail {
+
+template <class Observer, int Points>
+inline constexpr bool goes_around_guards<MappedInputConfig<Observer, Points>> = true;
+
+}  // namespace detail
+
 /// For an actuator with a dead zone, two gains or a curve: the observer inside gets the effect of
 /// u, so that b0 is one number. A controller around it puts out the u whose effect its law asks
 /// for.
@@ -39,8 +46,8 @@ requires(detail::goes_into_a_loop<Observer>()) struct MappedInputConfig {
 template <class Observer, int Points = 9>
 requires(detail::goes_into_a_loop<Observer>()) class MappedInput
     : public NamedAdapter<MappedInput<Observer, Points>, Observer,
-                          MappedInputConfig<Observer, Points>, true> {
-  using Base = NamedAdapter<MappedInput, Observer, MappedInputConfig<Observer, Points>, true>;
+                          MappedInputConfig<Observer, Points>> {
+  using Base = NamedAdapter<MappedInput, Observer, MappedInputConfig<Observer, Points>>;
   friend Base;
   friend struct detail::LaneAccess;
   friend struct detail::RecordAccess;
