@@ -503,7 +503,7 @@ shows() {  # shows FIELD FILE [OPTION...]
   local field=$1 status=0
   shift
   run "$@" || status=$?
-  [[ $status == 3 && $said == *"refused: $field"* && -s $page ]] &&
+  [[ $status == 3 && $said == *"refused: "*"$field"* && -s $page ]] &&
     grep -q 'What to record instead' "$page" && ! grep -q '<h2>Paste this' "$page"
   verdict $? "$*: expected a page that refuses for $field, got status $status: $said"
 }
@@ -515,12 +515,12 @@ written t,y,u , t >short.csv
 shows rows short.csv
 servo >rows.txt
 written t,y,u , t 'if (1) $3 = 1;' >constant.csv
-shows u constant.csv
+shows "u = 1: never changes" constant.csv
 [[ $said != *arning* && $said == *"never changes"* ]]
 verdict $? "constant.csv: $said"
 written t,y,u , t 'if (1) { x += (u - x) / 100; u = NR > 900 ? 5 : 0; $2 = x; $3 = u }' >single_step.csv
 shows '' single_step.csv
-[[ $said == *"u (u, 0 to 5) moves once only, at 1.8 s"* ]]
+[[ $said == *"u (u, 0 to 5) moves by a fifth of its range once only, at 1.8 s"* ]]
 verdict $? "single_step.csv: $said"
 # A u that is not this machine's.
 written t,y,u , t '$3 = sin(NR * NR);' >foreign.csv

@@ -273,6 +273,7 @@ TEST(Averaging, MustHelpAgreeAndBeShort) {
   plain.correlation = 0.7;
   plain.log.sample_time = T;
   plain.log.used = 8000;
+  plain.plateau.middle = 1;
   Identified best = plain, averaged = plain;
   averaged.averaged = 4;
   averaged.input_gain = {46, 1.1};
@@ -291,6 +292,16 @@ TEST(Averaging, MustHelpAgreeAndBeShort) {
   best.correlation = 0.15;
   averaged.correlation = 0.1;
   EXPECT_TRUE(better());
+  // A latency at the end of its range in rows: then b0 need not agree, if rows stay short beside it.
+  best.at_bound = true;
+  averaged.input_gain.value = 5;
+  averaged.latency.value = 12.1 * T;
+  EXPECT_TRUE(better());
+  averaged.latency.value = 11.9 * T;
+  EXPECT_FALSE(better());
+  averaged.latency.value = 100 * T;
+  averaged.at_bound = true;
+  EXPECT_FALSE(better());
 }
 
 // The part of u that a controller computes from y is not its own.

@@ -27,7 +27,7 @@ Residual residual_of(const Identified& found, const FitData& rows) {
   const auto& chosen =
       *std::find_if(found.orders.begin(), found.orders.end(),
                     [&](const OrderFit& order) { return order.model.order == found.order; });
-  FitData data = averaged(excerpt(rows, 60000), found.averaged);
+  FitData data = excerpt(averaged(rows, found.averaged), IdentifyOptions{}.rows_max);
   for (std::size_t c = 0; c < found.columns.size(); ++c) {
     const auto& column = found.columns[c];
     data.columns[c] = esokit::detail::late(data.columns[c], data.starts, data.sample_time,

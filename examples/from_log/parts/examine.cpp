@@ -2,6 +2,8 @@
 #include <cmath>
 #include <complex>
 #include <cstdio>
+#include <esokit/identify/gain_evidence.hpp>
+#include <esokit/identify/input_checks.hpp>
 #include <esokit/identify/spectrum.hpp>
 #include <numbers>
 #include <optional>
@@ -108,17 +110,24 @@ void sound_alarms(const Settings& settings, const Input& input, Findings& all) {
                "resolution."});
     }
   }
-  // Of a log that does not tell b0 its sign means nothing, unless a design is asked for anyway.
-  if (!all.seen || (all.refusal && !settings.anyway)) return;
-  const double b0 = found.input_gain.value;
+  if (!all.seen) return;
   if (const auto& sizes = found.by_size; sizes.differ()) {
-    all.alarms.push_back(
-        {"large-u", "b0 is " + number_text(sizes.below.value, 3) + " for u (" + input.u +
-                        ") up to " + number_text(sizes.knot, 3) + " and " +
-                        number_text(sizes.above.value, 3) +
-                        " beyond. Does the actuator saturate, stick, or act as the square of u? "
-                        "Record the u that it held, or correct u by its curve."});
+    const std::string text = "b0 is " + number_text(sizes.below.value, 3) + " for u (" + input.u +
+                             ") up to " + number_text(sizes.knot, 3) + " and " +
+                             number_text(sizes.above.value, 3) +
+                             " beyond. Does the actuator saturate, stick, or act as the square of "
+                             "u? Record the u that it held, or correct u by its curve: an "
+                             "ActuatorMap.";
+    // Of a log that is refused it is what was seen.
+    if (all.refusal && !settings.anyway) {
+      all.shown.insert(all.shown.begin(), text);
+    } else {
+      all.alarms.push_back({"large-u", text});
+    }
   }
+  // Of a log that does not tell b0 its sign means nothing, unless a design is asked for anyway.
+  if (all.refusal && !settings.anyway) return;
+  const double b0 = found.input_gain.value;
   if (found.held > 0.0) {
     all.alarms.push_back(
         {"sticks", "Friction holds the machine in " + number_text(100 * found.held, 2) +
@@ -131,7 +140,7 @@ void sound_alarms(const Settings& settings, const Input& input, Findings& all) {
                        " in the rows at standstill (" + number_text(100 * motion.still, 2) +
                        " %). Record faster motion with larger u."});
   }
-  if (found.lead.time > 0.0) {
+  if (esokit::detail::leads(found)) {
     all.alarms.push_back({"lead", "y (" + input.y + ") moves " + number_text(found.lead.time, 2) +
                                       " s before u: is u logged late?"});
   }
@@ -178,9 +187,14 @@ void say_moves(const Input& input, Findings& all) {
   }
   const std::string range = number_text(*low, 4) + " to " + number_text(*high, 4);
   if (at.size() <= 3) {
-    std::string text = "u (" + input.u + ", " + range + ") moves ";
+    if (at.empty()) {
+      all.shown.push_back("u (" + input.u + ", " + range +
+                          ") never moves by a fifth of its range and stays there.");
+      return;
+    }
+    std::string text = "u (" + input.u + ", " + range + ") moves by a fifth of its range ";
     text += at.size() == 1 ? "once only, " : "only " + std::to_string(at.size()) + " times, first ";
-    all.shown.push_back(text + "at " + duration_text(at.empty() ? 0.0 : at[0]) +
+    all.shown.push_back(text + "at " + duration_text(at[0]) +
                         ": what follows from u cannot be told from a drift that begins at about "
                         "that time.");
     return;
@@ -208,6 +222,19 @@ void say_column(const Input& input, Findings& all) {
   if (std::string_view(all.refusal->field) != "columns" || index < 0) return;
   all.shown.push_back("Column " + std::to_string(index) + " of --measured is " +
                       input.measured[static_cast<std::size_t>(index)] + ".");
+}
+
+/// u as it acted, where it was logged late.
+void take_earlier(int rows, Input& input, Findings& all) {
+  auto& u = input.log.u;
+  const auto by = static_cast<std::size_t>(rows);
+  for (std::size_t k = 0; k < u.size(); ++k) u[k] = u[std::min(k + by, u.size() - 1)];
+  all.rows = esokit::detail::advanced(std::move(all.rows), by);
+  input.notes.insert(
+      input.notes.begin(),
+      "u (" + input.u + ") was logged late, after it had acted: it was taken " +
+          (rows == 1 ? std::string("a row") : std::to_string(rows) + " rows") +
+          " earlier, which makes the log far more likely. If not, use --literal late-u.");
 }
 
 /// What is left when the model has explained what it can.
@@ -263,12 +290,20 @@ void say_residual(const compiled::Residual& residual, Findings& all) {
   if (all.residual_correlation[0] < -0.3) {
     all.shown.push_back("The residual changes its sign from row to row (correlation " +
                         number_text(all.residual_correlation[0], 2) +
-                        "), as of a speed from counts.");
+                        "), as of a speed from counts. Log the counts themselves (the position) "
+                        "and give --order 2: of these b0, lag and noise are found.");
   }
   if (all.residual_correlation[0] > 0.3) {
     all.shown.push_back("The residual changes little from row to row (correlation " +
                         number_text(all.residual_correlation[0], 2) +
                         "), as of a y that was filtered, or a machine of higher order.");
+  }
+  const double pieces = static_cast<double>(all.found.log.pieces);
+  if (all.found.log.pieces > 1 && rows < 300 * pieces) {
+    all.shown.push_back("The log consists of " + number_text(pieces) + " pieces of about " +
+                        number_text(rows / pieces, 3) +
+                        " rows: each is short, and how it began is not known. Record without "
+                        "gaps, or longer pieces.");
   }
   if (rows < 600) {
     all.shown.push_back(
@@ -280,7 +315,7 @@ void say_residual(const compiled::Residual& residual, Findings& all) {
 
 }  // namespace
 
-Findings examine(const Settings& settings, const Input& input) {
+Findings examine(const Settings& settings, Input& input) {
   Findings all;
   all.alarms = input.alarms;
   esokit::IdentifyOptions options;
@@ -289,6 +324,7 @@ Findings examine(const Settings& settings, const Input& input) {
   } else if (input.first_order) {
     options.orders = {1};
   }
+  options.late_input = !settings.literal.contains("late-u");
   if (settings.progress) {
     options.progress = [&](double share) { settings.progress("finding the machine", share); };
   } else if (input.log.y.size() > 200'000) {
@@ -317,6 +353,7 @@ Findings examine(const Settings& settings, const Input& input) {
   }
   all.found = *found;
   all.seen = true;
+  if (found->late_rows > 0) take_earlier(found->late_rows, input, all);
   if (const auto verdict = esokit::judge(*found, input.log, options); !verdict)
     all.refusal = verdict.error();
   const auto residual = compiled::residual_of(*found, all.rows);

@@ -118,7 +118,8 @@ struct Findings {
 };
 
 /// Identifies, and sounds the alarms.
-[[nodiscard]] Findings examine(const Settings& settings, const Input& input);
+/// @param input u is taken earlier in it, if it was logged late
+[[nodiscard]] Findings examine(const Settings& settings, Input& input);
 
 /// The unit for a time of this size: units in a second, and its name.
 inline std::pair<double, const char*> unit_of(double seconds) {

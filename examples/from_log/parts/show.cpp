@@ -31,21 +31,36 @@ std::string with_interval(const esokit::Estimate& estimate, double unit = 1.0) {
   return value + " ± " + half;
 }
 
-/// At what to do about it: more than fits into the error.
-std::string advice(const std::string& field) {
+/// What is wrong and what to do, in words of someone with a log; the numbers come behind it.
+std::string in_words(const std::string& field, const esokit::Identified& found) {
+  if (field == "lead") {
+    return "y moves before u, by " + duration_text(found.lead.time) +
+           ": u is most likely logged late, or y early. Log both by one clock, u when it acts.";
+  }
   static const std::map<std::string, const char*> all = {
+      {"at_once",
+       "y reacts in the row in which u changes: u is most likely logged after it acted, or y is an "
+       "acceleration or a force. Log u when it acts, and a speed or a position as y, with more "
+       "rows "
+       "a second."},
+      {"rise",
+       "y rises or falls faster than u can move it by this b0: u is most likely logged late, or "
+       "something else moves y. Log u when it acts, and what else moves y (--measured COLUMN)."},
+      {"order",
+       "Another order explains this log far better. Give it with --order (a position under a motor "
+       "has 2, a speed or a temperature 1), or log the y of this one."},
       {"own_input",
        "u depends on y alone: the loop is closed and its reference does not move. Log again with a "
        "reference that steps every few settling times, by as much as the machine may move. The "
        "controller may stay as it is."},
       {"excitation",
-       "Step u (or the reference) up and down by a tenth of its range or more, ten times or more, "
-       "with pauses in which the machine settles. Or sweep it slowly up to the bandwidth that the "
-       "controller should have."},
+       "What u does to y is not seen beside what else moves y. Step u (or the reference) up and "
+       "down by a tenth of its range or more, ten times or more, with pauses in which the machine "
+       "settles. Or sweep it slowly up to the bandwidth that the controller should have."},
       {"correlation",
-       "Log the u that the actuator held, y before its filters, and known effects (--measured "
-       "COLUMN). "
-       "Steps of u that last until y settles let output error decide instead."},
+       "Something moves y that neither u nor the model has, or y was filtered. Log the u that the "
+       "actuator held, y before its filters, and known effects (--measured COLUMN). Steps of u "
+       "that last until y settles let output error decide instead."},
       {"second_opinion",
        "From row to row y follows u by another b0 than over the whole log. Often the order is not "
        "that of the machine (--order), the actuator saturates or is not linear, or u was logged "
@@ -53,18 +68,23 @@ std::string advice(const std::string& field) {
       {"plateau",
        "b0 depends on the frequency. Log motion in the frequency band of the controller: faster "
        "steps, or a sweep."},
-      {"interval", "Record a longer log, or use larger steps; both make the interval smaller."},
+      {"interval",
+       "b0 is not known well enough. Record a longer log, or use larger steps; both make its "
+       "interval smaller."},
       {"latency", "u changes too slowly to find lag and dead time: use steps instead of ramps."},
       {"position_shift",
-       "If the force is gravity, add a column with the sine of the angle to the file, if it is a "
-       "spring, a column with y, and name the column with --measured."},
+       "A force that depends on y seems to be missing. If it is gravity, add a column with the "
+       "sine of the angle to the file, if it is a spring, a column with y, and name the column "
+       "with --measured."},
       {"friction_shift",
-       "Friction and b0 can only be separated by motion that is much faster than the speed at "
-       "which the machine sticks."},
-      {"saturated", "Log the u that the actuator really held."},
+       "Friction and b0 cannot be separated by this motion. Log motion that is much faster than "
+       "the speed at which the machine sticks."},
+      {"saturated", "u is mostly at its limits. Log the u that the actuator really held."},
       {"rows",
-       "Record at least 200 rows without a gap; 20 s at the sample rate of the controller are "
-       "better."}};
+       "The log is too short. Record at least 200 rows without a gap; 20 s at the sample rate of "
+       "the controller are better."}};
+  // What depends on the size of u looks as if it depended on the frequency.
+  if (field == "plateau" && found.by_size.differ()) return "b0 depends on the size of u.";
   const auto at = all.find(field);
   return at == all.end() ? "" : at->second;
 }
@@ -297,9 +317,11 @@ std::vector<CsvRow> log_table(const Input& input, const Findings& findings) {
 
 std::vector<std::string> why_refused(const Findings& findings) {
   if (!findings.refusal) return {};
-  std::vector<std::string> lines{esokit::to_text(*findings.refusal)};
+  const std::string numbers = esokit::to_text(*findings.refusal);
+  const std::string words = in_words(findings.refusal->field, findings.found);
+  std::vector<std::string> lines{words.empty() ? numbers : words};
   lines.insert(lines.end(), findings.shown.begin(), findings.shown.end());
-  if (const auto more = advice(findings.refusal->field); !more.empty()) lines.push_back(more);
+  if (!words.empty()) lines.push_back("In numbers: " + numbers + ".");
   return lines;
 }
 
@@ -372,7 +394,7 @@ Outcome work_out(const Settings& settings) { return work_out(settings, read_log(
 Outcome work_out(const Settings& settings, const Input& input) {
   Outcome outcome;
   outcome.input = input;
-  outcome.findings = examine(settings, input);
+  outcome.findings = examine(settings, outcome.input);
   const bool usable = outcome.findings.seen && (!outcome.findings.refusal || settings.anyway);
   if (usable && !settings.no_design) {
     if (settings.progress) settings.progress("choosing a controller", -1.0);

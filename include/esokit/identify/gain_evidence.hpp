@@ -36,9 +36,12 @@ bool white(const Identified& found, const IdentifyOptions& options);
 /// Half a row, s: what takes less is not seen.
 double half_row(const Identified& found);
 
-/// Whether output error tells b0. Where y follows u within half a row, no machine was seen between
-/// them (y may have been logged before u, or b0 is lost in the noise): then it confirms nothing but
-/// what nearly all of y says of a position, which u has to move for many rows.
+/// Whether y moves before u. An optimum of the noise may look so: output error has to explain y
+/// better with u so much earlier, too, or to be nearer to the b0 of the lead.
+bool leads(const Identified& found);
+
+/// Whether output error tells b0: it is informative, and y does not move before u. Where y follows
+/// u within half a row, no machine was seen between them: then it has to explain nearly all of y.
 bool informed(const Identified& found);
 
 /// Half width that b0 of a plateau within two octaves of the lowest bandwidth needs. There every

@@ -36,7 +36,7 @@ struct IdentifyOptions {
   int sinusoids = 3;      ///< largest number of sines in the disturbance
   int schedule_bins = 4;  ///< number of ranges of the scheduling column, with equal numbers of rows
   int averaged = 0;       ///< rows to average into one; 0: chosen from the innovations
-  std::size_t rows_max = 60000;  ///< rows used of a longer log, in evenly spread pieces
+  std::size_t rows_max = 20000;  ///< rows used of a longer log, in evenly spread pieces
 
   /// Whether u is what the actuator held. A command beyond its limits is not.
   bool applied = true;
@@ -44,6 +44,10 @@ struct IdentifyOptions {
   /// Whether the effect of a column may be late: its lag and its dead time are found. A known
   /// effect (gravity, friction of another joint) acts at once.
   bool late_columns = true;
+
+  /// Whether u may have been logged a row or two late, after it had acted: taken where that makes
+  /// the log far more likely (`Identified::late_rows`).
+  bool late_input = true;
   double interval_max = 0.1;      ///< largest half width of the interval of b0, share of b0
   double interval_agreed = 0.35;  ///< the same if output error finds the same b0
   double plateau_max = 0.1;       ///< largest relative difference of b0 between three bandwidths
@@ -143,6 +147,8 @@ struct Identified {
   /// that b0, pole and friction are fitted without u there; 0: it does not hold. Latency, lag and
   /// dead time are of all rows.
   double held = 0;
+  double rise = 0;                 ///< how fast y changes, over what b0 and pole allow (order 1)
+  int late_rows = 0;               ///< rows by which u was taken earlier than it was logged
   Lead lead{};                     ///< how early y moves before u, if it does
   Rival rival{};                   ///< the other order that explains the log best there
   bool at_once = false;            ///< y follows u within the row, with nothing in between

@@ -42,6 +42,7 @@ struct GainInMotion {
 struct Lead {
   double time = 0.0;        ///< s by which y moves before u; 0: it does not
   double input_gain = 0.0;  ///< b0 with u earlier by this time
+  double left = 1.0;        ///< of the mean square of output error, if u is that much earlier
 };
 
 namespace detail {
@@ -54,9 +55,15 @@ GainInMotion gain_in_motion(const FitData& data, const FitModel& model, const Fi
 GainBySize gain_by_size(const FitData& data, const FitModel& model, const FitBounds& bounds,
                         const FitPoint& at);
 
+/// The same rows with u as it is logged `rows` later.
+FitData advanced(FitData data, std::size_t rows);
+
 /// The lead of y, by a fit with u advanced by ten rows: it must leave less than three quarters of
 /// the mean square of `here`.
 Lead lead_of(const FitData& data, const FitModel& model, const FitBounds& bounds, const Fit& here);
+
+/// Between the fastest rise and the fastest fall of y over `window` s; 0 if no piece is so long.
+double span_of_rates(const FitData& data, double window);
 
 /// The values of each row less their mean, as they were `by` rows before; zeros in the first two
 /// rows.

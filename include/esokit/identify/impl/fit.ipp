@@ -216,7 +216,10 @@ ESOKIT_FUNCTION void InnovationsFit::normal_equations(std::span<const std::vecto
 }
 
 ESOKIT_FUNCTION std::size_t InnovationsFit::lead(std::size_t from, std::size_t to) const {
-  const auto most = static_cast<std::size_t>(std::ceil(bounds_.latency_max / data_.sample_time));
+  // Of a short piece more than a third would say too little.
+  const auto most =
+      (std::min)(static_cast<std::size_t>(std::ceil(bounds_.latency_max / data_.sample_time)),
+                 (to - from) / 3);
   const std::vector<double>& u = data_.u;
   double first = 0.0, all = 0.0;
   std::size_t rest = 0;
@@ -227,7 +230,7 @@ ESOKIT_FUNCTION std::size_t InnovationsFit::lead(std::size_t from, std::size_t t
     if (k <= from + most) first += move;
   }
   const double share = static_cast<double>(most) / static_cast<double>(to - from);
-  return first > (std::max)(0.1, 3.0 * share) * all ? rest : most;
+  return first > std::clamp(3.0 * share, 0.1, 0.6) * all ? rest : most;
 }
 
 ESOKIT_FUNCTION FitPoint InnovationsFit::moved(FitPoint p,

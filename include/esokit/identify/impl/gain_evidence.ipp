@@ -115,12 +115,21 @@ ESOKIT_FUNCTION double half_row(const Identified& found) {
   return 0.5 * found.averaged * found.log.sample_time;
 }
 
+ESOKIT_FUNCTION bool leads(const Identified& found) {
+  if (!(found.lead.time > 0.0)) return false;
+  const SecondOpinion& second = found.second_opinion;
+  if (!second.informative()) return true;
+  return found.lead.left < 0.8 || (std::abs)(second.input_gain.value - found.lead.input_gain) <
+                                      (std::abs)(second.input_gain.value - found.input_gain.value);
+}
+
 ESOKIT_FUNCTION bool informed(const Identified& found) {
   const SecondOpinion& second = found.second_opinion;
-  if (!second.informative()) return false;
+  if (!second.informative() || leads(found)) return false;
   return found.latency.value >= half_row(found) ||
-         (found.order >= 2 && second.explained >= 0.95 && !(found.lead.time > 0.0) &&
-          (std::abs)(second.input_gain.value / found.input_gain.value - 1.0) <= 0.1);
+         (second.explained >= 0.95 &&
+          (std::abs)(second.input_gain.value - found.input_gain.value) <=
+              (std::max)(0.1 * (std::abs)(found.input_gain.value), found.input_gain.half_width));
 }
 
 ESOKIT_FUNCTION double reach_above(const Plateau& plateau, double bandwidth_min) {

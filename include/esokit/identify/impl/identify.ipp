@@ -371,7 +371,26 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
     }
   }
   if (!(result.held > 0.0)) result.lead = lead_of(used, model, bounds, here.fit);
+  if (const SecondOpinion& second = result.second_opinion;
+      result.lead.time > 0.0 && second.informative()) {
+    const auto by = static_cast<std::size_t>(std::ceil(result.lead.time / rows.sample_time));
+    const SecondOpinion earlier =
+        second_opinion(advanced(used, by), model, bounds, here.fit.at, second.bandwidth);
+    result.lead.left = (1.0 - earlier.explained) / (1.0 - second.explained);
+  }
   result.input_gain = widened(result, options);
+  if (result.order == 1) {
+    const auto span = [](const std::vector<double>& values) {
+      const auto [low, high] = std::minmax_element(values.begin(), values.end());
+      return *high - *low;
+    };
+    const double window = (std::max)(result.latency.value, 8.0 * rows.sample_time);
+    const double most = (std::abs)(result.input_gain.value) * span(used.u) +
+                        (std::max)(result.pole.value, 0.0) * span(used.y) +
+                        2.0 * result.friction.value +
+                        6.0 * (result.noise.value + result.log.quantisation) / window;
+    result.rise = span_of_rates(used, window) / most;
+  }
   // The margins of a design have to hold for it, too.
   if (const double unseen = half_row(result) - result.latency.value;
       unseen > 0.0 && !white(result, options) && informed(result)) {
@@ -380,13 +399,134 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
   return result;
 }
 
+/// Whether b0 was seen, and the latency is not at the end of its range.
+inline bool within_reach(const Identified& found) {
+  return !found.at_bound && found.plateau.middle > 0 && found.excitation < excitation_max;
+}
+
 ESOKIT_FUNCTION bool better(const Identified& averaged, const Identified& plain,
                             const Identified& best, const IdentifyOptions& options) {
   const double apart = (std::abs)(averaged.input_gain.value - plain.input_gain.value);
   const double span = averaged.averaged * averaged.log.sample_time;
+  // A latency that is longer than its range in rows is of another b0; and rows that are too short
+  // may see no motion.
+  if (!within_reach(best)) {
+    return within_reach(averaged) && span * (std::abs)(averaged.pole.value) < 0.2 &&
+           3.0 * span <= averaged.latency.value;
+  }
   return (white(averaged, options) || averaged.correlation < 0.5 * best.correlation) &&
          apart <= averaged.input_gain.half_width + plain.input_gain.half_width &&
          span * (std::abs)(averaged.pole.value) < 0.2;
+}
+
+/// The study of averaged rows that is best, and that of rows as they are.
+struct Folded {
+  Identified first{};
+  Identified best{};
+};
+
+/// Studies rows, and averages of them for as long as these help: until the model explains the log,
+/// and the latency is within its range, which in rows is limited.
+inline std::optional<Folded> study_folds(const FitData& all, bool scheduling,
+                                         const IdentifyOptions& options, Identified result,
+                                         const std::function<void(double)>& progress) {
+  const FitData raw = excerpt(all, options.rows_max);
+  result.log.used = raw.y.size();
+  result.own_input = own_input(raw);
+  result.at_once = at_once(raw);
+  std::vector<int> folds = {1, 4, 8, 16, 32, 64, 100};
+  if (options.averaged > 0) folds = {options.averaged};
+  // Once an order is chosen and at a bound, it alone is tried within wider ones.
+  IdentifyOptions how = options;
+  bool wide = false;
+  std::optional<Folded> found;
+  Estimate raw_noise;
+  double done = 0.0;
+  for (const int fold : folds) {
+    // A lag of many rows needs stretches that are longer.
+    FitData rows = excerpt(averaged(all, fold), options.rows_max);
+    if (rows.y.size() < 200) break;
+    std::vector<double> along;
+    if (scheduling) {
+      along = std::move(rows.columns.back());
+      rows.columns.pop_back();
+    }
+    const double share = 0.6 * (1.0 - done);
+    result.averaged = fold;
+    result.log.used = rows.y.size() * static_cast<std::size_t>(fold);
+    const auto studied = [&] {
+      return study_rows(rows, along, how, result, raw_noise, wide, [&](double part) {
+        progress(done + share * (wide ? 0.5 + 0.5 * part : 0.5 * part));
+      });
+    };
+    Identified here = studied();
+    if (here.at_bound && !wide) {
+      wide = true;
+      how.orders = {here.order};
+      const auto orders = here.orders;
+      here = studied();
+      for (const OrderFit& order : orders) {
+        if (order.model.order != here.order) here.orders.push_back(order);
+      }
+      std::sort(here.orders.begin(), here.orders.end(),
+                [](const auto& a, const auto& b) { return a.model.order < b.model.order; });
+    }
+    done += share;
+    const bool out_of_reach = !within_reach(here);
+    if (!found) {
+      found = Folded{here, std::move(here)};
+    } else if (better(here, found->first, found->best, options)) {
+      found->best = std::move(here);
+    }
+    const bool decided = white(found->best, options) || informed(found->best);
+    if ((decided && within_reach(found->best)) || !(result.own_input > own_input_min)) break;
+    // At the end of the range of its latency nothing is said of the order.
+    if (out_of_reach) how = options, wide = false;
+    if (fold >= 16 && within_reach(found->best)) break;
+  }
+  return found;
+}
+
+/// The fit of the order that was chosen.
+inline const OrderFit& chosen_fit(const Identified& found) {
+  return *std::find_if(found.orders.begin(), found.orders.end(),
+                       [&](const OrderFit& order) { return order.model.order == found.order; });
+}
+
+/// Whether rows with u `rows` earlier are far more likely at all: by the same model from several
+/// starts.
+inline bool worth_earlier(const Folded& found, const FitData& raw, const FitData& earlier,
+                          int rows) {
+  (void)rows;
+  const OrderFit& chosen = chosen_fit(found.first);
+  const auto least = [&](const FitData& data) {
+    InnovationsFit fit(data, chosen.model, chosen.bounds);
+    Fit best = fit.minimise(chosen.fit.at, true, 8);
+    for (const double latency : {0.5, 3.0, 12.0, 40.0}) {
+      FitPoint start = chosen.fit.at;
+      start.latency = latency * raw.sample_time;
+      const Fit other = fit.minimise(start, true, 8);
+      if (other.mean_square < best.mean_square) best = other;
+    }
+    return static_cast<double>(best.rows) * std::log(best.mean_square);
+  };
+  return least(earlier) < least(raw) - 40.0;
+}
+
+/// Whether u was logged late. That must make the log far more likely, and output error must find
+/// the same b0, of the same sign as before: where u follows from y of its own row, u that is taken
+/// earlier tells the noise of y.
+inline bool far_more_likely(const Folded& earlier, const Folded& as_logged) {
+  const Identified& found = earlier.best;
+  const SecondOpinion& second = found.second_opinion;
+  const SecondOpinion& before = as_logged.best.second_opinion;
+  if (!(chosen_fit(earlier.first).criterion < chosen_fit(as_logged.first).criterion - 40.0))
+    return false;
+  if (found.at_once || leads(found) || !second.informative() ||
+      !second.agrees(found.input_gain.value))
+    return false;
+  if (before.informative() && before.input_gain.value * second.input_gain.value < 0.0) return false;
+  return second.explained > before.explained - 0.02;
 }
 
 }  // namespace detail
@@ -434,7 +574,6 @@ ESOKIT_FUNCTION Expected<Identified, Error<double>> study(const Log& log,
   Identified result;
   result.log = prepared->report;
   const FitData raw = excerpt(prepared->data, options.rows_max);
-  result.log.used = raw.y.size();
   const auto [least, largest] = std::minmax_element(raw.u.begin(), raw.u.end());
   if (!(*largest > *least))
     return E{"u", *least, "never changes: record a log in which the input moves"};
@@ -444,54 +583,26 @@ ESOKIT_FUNCTION Expected<Identified, Error<double>> study(const Log& log,
   for (std::size_t c = 0; c < log.columns.size(); ++c) {
     if (auto told = detail::tells_itself(raw, c); !told) return told.error();
   }
-  result.own_input = detail::own_input(raw);
-  result.at_once = detail::at_once(raw);
-  std::vector<int> folds = {1, 4, 8, 16};
-  if (options.averaged > 0) folds = {options.averaged};
-  // Once an order is chosen and at a bound, it alone is tried within wider ones.
-  IdentifyOptions how = options;
-  bool wide = false;
-  std::optional<Identified> first, best;
-  Estimate raw_noise;
-  double done = 0.1;
-  for (const int fold : folds) {
-    FitData rows = averaged(raw, fold);
-    if (rows.y.size() < 200) break;
-    std::vector<double> along;
-    if (scheduling) {
-      along = std::move(rows.columns.back());
-      rows.columns.pop_back();
-    }
-    const double share = 0.6 * (1.0 - done);
-    result.averaged = fold;
-    const auto studied = [&] {
-      return detail::study_rows(rows, along, how, result, raw_noise, wide, [&](double part) {
-        if (options.progress)
-          options.progress(done + share * (wide ? 0.5 + 0.5 * part : 0.5 * part));
-      });
-    };
-    Identified found = studied();
-    if (found.at_bound && !wide) {
-      wide = true;
-      how.orders = {found.order};
-      const auto orders = found.orders;
-      found = studied();
-      for (const OrderFit& order : orders) {
-        if (order.model.order != found.order) found.orders.push_back(order);
-      }
-      std::sort(found.orders.begin(), found.orders.end(),
-                [](const auto& a, const auto& b) { return a.model.order < b.model.order; });
-    }
-    done += share;
-    if (!first) first = found;
-    if (!best || detail::better(found, *first, *best, options)) best = std::move(found);
-    const bool decided = detail::white(*best, options) || detail::informed(*best);
-    if (decided || !(result.own_input > detail::own_input_min)) break;
-  }
-  if (!best)
+  const auto studied = [&](const FitData& rows, double from, double share) {
+    return detail::study_folds(rows, scheduling, options, result, [&](double part) {
+      if (options.progress) options.progress(from + share * part);
+    });
+  };
+  auto found = studied(prepared->data, 0.1, 0.5);
+  if (!found)
     return E{"averaged", static_cast<double>(options.averaged), "leaves fewer than 200 rows"};
+  if (options.late_input) {
+    for (int rows = 1; rows <= 2; ++rows) {
+      const FitData earlier = detail::advanced(prepared->data, static_cast<std::size_t>(rows));
+      if (!detail::worth_earlier(*found, raw, excerpt(earlier, options.rows_max), rows)) break;
+      result.late_rows = rows;
+      auto again = studied(earlier, 0.6, 0.3);
+      if (!again || !detail::far_more_likely(*again, *found)) break;
+      found = std::move(again);
+    }
+  }
   if (options.progress) options.progress(1.0);
-  return *best;
+  return found->best;
 }
 
 ESOKIT_FUNCTION Check<double> judge(const Identified& found, const Log& log,
@@ -526,7 +637,7 @@ ESOKIT_FUNCTION Check<double> judge(const Identified& found, const Log& log,
   const double off = (std::abs)(found.lead.input_gain - found.input_gain.value);
   const double harmless =
       (std::max)(found.input_gain.half_width, 0.1 * (std::abs)(found.input_gain.value));
-  rules.demand(!(found.lead.time > 0.0) || (off <= harmless && found.input_gain.share() <= widest),
+  rules.demand(!detail::leads(found) || (off <= harmless && found.input_gain.share() <= widest),
                "lead", found.lead.time, "is the time by which y moves before u: is u logged late?");
   rules.demand(detail::white(found, options) || informed,
                {"correlation", found.correlation,
@@ -534,6 +645,9 @@ ESOKIT_FUNCTION Check<double> judge(const Identified& found, const Log& log,
                 "error does not tell b0 either: record longer, with steps of u that last until y "
                 "settles, or add known effects as columns; must be at most",
                 -1, detail::correlation_limit(found, options), true});
+  rules.demand(found.rise < 2.0, "rise", found.rise,
+               "is how fast y rises and falls over what b0 times the range of u allows: something "
+               "else moves y, or u was logged late; record u when it acts");
   rules.demand(!informed || second.agrees(found.input_gain.value),
                {"second_opinion", found.input_gain.value / second.input_gain.value,
                 "is b0 over that of output error: they must agree by 0.6 to 1.7"});

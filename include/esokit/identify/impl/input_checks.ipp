@@ -84,17 +84,21 @@ ESOKIT_FUNCTION GainBySize gain_by_size(const FitData& data, const FitModel& mod
   return {knot, below, above};
 }
 
+ESOKIT_FUNCTION FitData advanced(FitData data, std::size_t rows) {
+  for (std::size_t piece = 0; piece < data.starts.size(); ++piece) {
+    const std::size_t to = piece + 1 < data.starts.size() ? data.starts[piece + 1] : data.u.size();
+    for (std::size_t k = data.starts[piece]; k < to; ++k)
+      data.u[k] = data.u[(std::min)(k + rows, to - 1)];
+  }
+  return data;
+}
+
 ESOKIT_FUNCTION Lead lead_of(const FitData& data, const FitModel& model, const FitBounds& bounds,
                              const Fit& here) {
   constexpr std::size_t rows = 10;
   const double T = data.sample_time;
-  FitData advanced = data;
-  for (std::size_t piece = 0; piece < data.starts.size(); ++piece) {
-    const std::size_t to = piece + 1 < data.starts.size() ? data.starts[piece + 1] : data.u.size();
-    for (std::size_t k = data.starts[piece]; k < to; ++k)
-      advanced.u[k] = data.u[(std::min)(k + rows, to - 1)];
-  }
-  InnovationsFit fit(advanced, model, bounds);
+  const FitData earlier = advanced(data, rows);
+  InnovationsFit fit(earlier, model, bounds);
   Fit best;
   best.mean_square = std::numeric_limits<double>::infinity();
   for (const double part : {2.0, 5.0, 8.0}) {
@@ -106,7 +110,22 @@ ESOKIT_FUNCTION Lead lead_of(const FitData& data, const FitModel& model, const F
   const double lead = static_cast<double>(rows) * T - best.at.latency;
   // A model error may look like a lead, but then the lead helps little.
   if (!(best.mean_square < 0.75 * here.mean_square && lead > 0.3 * T)) return {};
-  return {lead, best.input_gain()};
+  return {lead, best.input_gain(), 1.0};
+}
+
+ESOKIT_FUNCTION double span_of_rates(const FitData& data, double window) {
+  const double T = data.sample_time;
+  const auto by = static_cast<std::size_t>((std::max)(4.0, std::ceil(window / T)));
+  double fastest = 0.0, slowest = 0.0;
+  for (std::size_t piece = 0; piece < data.starts.size(); ++piece) {
+    const std::size_t to = piece + 1 < data.starts.size() ? data.starts[piece + 1] : data.y.size();
+    for (std::size_t k = data.starts[piece]; k + by < to; ++k) {
+      const double rate = (data.y[k + by] - data.y[k]) / (static_cast<double>(by) * T);
+      fastest = (std::max)(fastest, rate);
+      slowest = (std::min)(slowest, rate);
+    }
+  }
+  return fastest - slowest;
 }
 
 /// A linear law, found by least squares.
