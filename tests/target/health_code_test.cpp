@@ -1,6 +1,7 @@
 // The C of a monitor, fed by the C of its controller, equals the C++ of both bit for bit: on a
 // sound loop, with a b0 of the wrong sign or several times too small, and with bad measurements.
 #include <array>
+#include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/control/health.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
@@ -57,10 +58,11 @@ struct Found {
   bool reversed;
 };
 
-/// @param plant_gain over b0 @return how often which fault was named
+/// @param plant_gain over b0 @param stands share of the time for which the sensor stands still
+/// @param loses whether some samples in a row are missing @return how often which fault was named
 template <class C>
-/// @param stands share of the time for which the sensor stands still
-std::array<int, 9> watches(double plant_gain, double bad, std::uint64_t seed, double stands = 0) {
+std::array<int, 9> watches(double plant_gain, double bad, std::uint64_t seed, double stands = 0,
+                           bool loses = false) {
   SCOPED_TRACE(testing::internal::GetTypeName<C>());
   using V = typename C::scalar_type;
   std::array<int, 9> named{};
@@ -85,16 +87,19 @@ std::array<int, 9> watches(double plant_gain, double bad, std::uint64_t seed, do
   std::vector<std::uint64_t> its(1000);
   void (*init)(void*, void*) = nullptr;
   V (*update)(void*, V, V) = nullptr;
+  V (*miss)(void*, V) = nullptr;
   void (*look)(const void*, void*, double) = nullptr;
   unsigned (*diagnoses)(const void*) = nullptr;
   library.find(init, "both_init");
   library.find(update, "loop_update");
+  library.find(miss, "loop_update_without_measurement");
   library.find(look, "both_look");
   library.find(diagnoses, "health_diagnose");
   init(loop.data(), its.data());
   ChainPlant plant(C::order, 0.0078125, 8 * plant_gain, 1.5);
   Random random(seed);
   V r(1);
+  int lost = 0;
   for (int k = 0; k < 20000; ++k) {
     plant.set_disturbance(std::sin(0.01 * k));
     plant.step(static_cast<double>(mine.output()));
@@ -104,8 +109,15 @@ std::array<int, 9> watches(double plant_gain, double bad, std::uint64_t seed, do
     if (k % 8000 < 8000 * stands) y = V(0.25);
     if (random.uniform(0, 1) < bad)
       y = random.index(2) == 0 ? hidden_nan<V>() : anything<V>(random);
-    (void)mine.update(y, r);
-    (void)update(loop.data(), y, r);
+    if (loses && random.index(500) == 0) lost = random.index(14);
+    if (lost > 0) {
+      --lost;
+      (void)mine.update_without_measurement(r);
+      (void)miss(loop.data(), r);
+    } else {
+      (void)mine.update(y, r);
+      (void)update(loop.data(), y, r);
+    }
     // Every other run without a watched sensor.
     if (seed % 2 == 1) {
       watch.look(mine);
@@ -152,8 +164,76 @@ TEST(HealthCode, EqualsTheMonitor) {
   often(watches<C>(-1, 0, 2), LoopFault::wrong_sign);
   often(watches<Small>(6, 0, 3), LoopFault::innovation_too_large);
   often(watches<Cascade>(1, 0.3, 4), LoopFault::measurements_rejected);
+  (void)watches<Adrc<OutlierGate<LinearEso<2, double>>>>(1, 0.05, 10, 0, true);
   often(watches<C>(1, 0, 6, 0.8), LoopFault::sensor_still);
   often(watches<Small>(-1, 0.01, 8, 0.3), LoopFault::wrong_sign);
+}
+
+/// What is found at, beside and between all limits.
+template <class V>
+void diagnoses_alike(std::uint64_t seed) {
+  using C = Adrc<LinearEso<1, V>>;
+  const auto watch = monitor<C>(V(1e-3));
+  const Folder folder;
+  const Library library(folder,
+                        to_c(watch, C::make(config<C>(8)).value(), {.name = "loop"}).value(), "");
+  ASSERT_TRUE(library.loaded());
+  unsigned (*diagnoses)(const void*) = nullptr;
+  library.find(diagnoses, "loop_diagnose");
+  Random random(seed);
+  const auto about = [&](std::initializer_list<double> limits) {
+    const double one = limits.begin()[random.index(static_cast<int>(limits.size()))];
+    const double beside = 1 + 1e-3 * random.uniform(-1, 1);
+    const int how = random.index(3);
+    return static_cast<V>(how == 0 ? one : how == 1 ? one * beside : one * random.uniform(-2, 2));
+  };
+  std::array<int, 9> named{};
+  std::vector<std::uint64_t> its(1000);
+  for (int k = 0; k < 100000; ++k) {
+    Health<V> health = watch.health();
+    health.response = about({2.5, 12});
+    health.gain_ratio = about({-0.5, -0.12, 0.25, 3, static_cast<double>(health.response) / 4});
+    health.evidence = about({1, 5, 50});
+    health.sign_ratio = about({-0.25, 0, 1});
+    health.opposed = about({4});
+    health.steady = about({40});
+    health.saturated = about({0.05, 0.5});
+    health.side = static_cast<V>(about({0.8}) * health.saturated);
+    health.lost = about({0.1, 0});
+    health.standing = about({0.99, 0});
+    health.innovation = about({3 * static_cast<double>(health.innovation_of_noise)});
+    health.reversed = random.index(50) == 0;
+    const Found<V> found{0,
+                         0,
+                         0,
+                         0,
+                         health.lost,
+                         health.saturated,
+                         health.side,
+                         health.innovation,
+                         health.gain_ratio,
+                         health.sign_ratio,
+                         health.response,
+                         health.evidence,
+                         health.opposed,
+                         health.steady,
+                         health.standing,
+                         health.reversed};
+    std::memcpy(its.data(), &found, sizeof found);
+    const auto fault = static_cast<unsigned>(diagnose(health));
+    ASSERT_EQ(fault, diagnoses(its.data())) << k;
+    ++named[fault];
+  }
+  for (unsigned fault = 0; fault < named.size(); ++fault) {
+    if (fault == static_cast<unsigned>(LoopFault::bounded)) continue;
+    EXPECT_GT(named[fault], 300) << fault;
+  }
+}
+
+TEST(HealthCode, DiagnosesAlike) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  diagnoses_alike<double>(1);
+  diagnoses_alike<float>(2);
 }
 
 TEST(HealthCode, CompilesWithOtherCompilers) {
