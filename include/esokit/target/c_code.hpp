@@ -2,12 +2,8 @@
 /// to_c: a finished controller or observer as C99, written from its recorded calls.
 #pragma once
 
-#include <algorithm>
-#include <cstddef>
-#include <cstdint>
+#include <esokit/core/compiled.hpp>
 #include <esokit/core/expected.hpp>
-#include <esokit/target/c_design.hpp>
-#include <esokit/target/list_writer.hpp>
 #include <esokit/target/recorded_design.hpp>
 #include <esokit/target/writable.hpp>
 #include <string>
@@ -26,12 +22,6 @@ struct CCode {
 
 namespace detail {
 
-/// The texts of a design. @param mark of its text, if settings can be changed
-inline CCode c_texts(const RecordedDesign& design, const std::string& mark) {
-  CDesign text(design, mark);
-  return {text.header(), text.source(), text.settings_file()};
-}
-
 /// All of it, empty if there is none.
 template <class Code>
 std::string text_of(const Code& made) {
@@ -39,21 +29,7 @@ std::string text_of(const Code& made) {
 }
 
 /// The texts; settings bear a mark of what else is in them.
-inline CCode c_code(const RecordedDesign& design) {
-  if (!design.options.settings_in_struct) return c_texts(design, "");
-  RecordedDesign rest = design;
-  for (double& number : rest.numbers) number = 0;
-  for (auto& row : rest.gap_gains) std::fill(row.begin(), row.end(), 0.0);
-  rest.samples.clear();
-  rest.options.comment = {};
-  rest.options.settings_name = {};
-  const CCode same = c_texts(rest, "");
-  std::uint32_t mark = 2166136261u;  // FNV-1a
-  for (const char c : same.header + same.source) {
-    mark = (mark ^ static_cast<unsigned char>(c)) * 16777619u;
-  }
-  return c_texts(design, std::to_string(mark) + "u");
-}
+CCode c_code(const RecordedDesign& design);
 
 }  // namespace detail
 
@@ -127,3 +103,7 @@ void to_c(const Other&, const CodeOptions& = {}) {
 }
 
 }  // namespace esokit
+
+#if defined(ESOKIT_HEADER_ONLY)
+#include <esokit/target/impl/c_code.ipp>
+#endif

@@ -2,10 +2,10 @@
 /// FixedRecord: a recorded design in counts, before it is in integers.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <esokit/core/compiled.hpp>
 #include <esokit/target/fixed_bounds.hpp>
 #include <esokit/target/integer_list.hpp>
 #include <esokit/target/linear_call.hpp>
@@ -27,45 +27,9 @@ class FixedRecord {
 
   /// @param given scales and order that settings of this design are to fit into
   FixedRecord(const RecordedDesign& design, const FixedPointOptions& options,
-              const FixedLayout* given)
-      : FixedRecord(design, options) {
-    given_ = given;
-    if (given == nullptr) return;
-    layout = *given;
-    rounds_ = given->rounds;
-    coarser_ = given->coarser;
-    narrow_scale_ = given->narrow;
-    left_over_scale_ = given->left_over;
-  }
+              const FixedLayout* given);
   /// @param others layouts of designs whose settings are to fit, too; none: as they are
-  void make_room(const std::vector<FixedLayout>& others) {
-    for (const FixedLayout& other : others) {
-      const bool first = room_.scale.empty();
-      const auto join = [first](auto& all, const auto& more, const auto& either) {
-        if (first) all.assign(more.begin(), more.end());
-        for (std::size_t i = 0; i < all.size() && i < more.size(); ++i) {
-          all[i] = either(all[i], more[i]);
-        }
-      };
-      const auto least = [](auto a, auto b) { return a < b ? a : b; };
-      const auto most = [](auto a, auto b) { return a < b ? b : a; };
-      join(room_.scale, other.scale, least);
-      join(room_.keeps, other.keeps, [](bool a, bool b) { return a || b; });
-      for (std::size_t k = 0; k < 2; ++k) join(room_.gains[k], other.gains[k], most);
-      room_.law_scale = first ? other.law_scale : least(room_.law_scale, other.law_scale);
-      rounds_ = rounds_ || other.rounds;
-      // Of a state it is in its scale.
-      for (const auto& [owner, bits] : other.coarser) {
-        if (owner >= static_cast<int>(other.scale.size())) {
-          coarser_[owner] = most(coarser_[owner], bits);
-        }
-      }
-      for (const auto& [owner, scale] : other.narrow) {
-        const auto there = narrow_scale_.find(owner);
-        narrow_scale_[owner] = there == narrow_scale_.end() ? scale : least(there->second, scale);
-      }
-    }
-  }
+  void make_room(const std::vector<FixedLayout>& others);
   FixedLayout layout{};
 
   FixedRefusal refusal{};
@@ -97,60 +61,18 @@ class FixedRecord {
   }
   /// u before the first sample, in counts: as of the controller, that of the hold, or the nearest
   /// to zero within the limits.
-  [[nodiscard]] std::int64_t start_held() const {
-    const std::int64_t first = design_->loop.hold_left > 0 ? hold_counts() : 0;
-    return std::clamp(first, static_cast<std::int64_t>(lower), static_cast<std::int64_t>(upper));
-  }
+  [[nodiscard]] std::int64_t start_held() const;
   [[nodiscard]] double reference_most() const {
     return wraps_ ? std::ldexp(1.0, options_.y.counter_bits - 1) : options_.y.most;
   }
   /// So many samples after the last measurement the next can still be used: one, if the design has
   /// no table of gains, because they would go on.
-  [[nodiscard]] int table_rows() const {
-    int rows = (std::max)(1, static_cast<int>(design_->gap_gains.size()));
-    if (wraps_) {
-      const int half = (1 << (options_.y.counter_bits - 1)) - 1;
-      rows = (std::min)(rows, half / options_.y.most);
-    }
-    return rows;
-  }
+  [[nodiscard]] int table_rows() const;
   /// The correction so many samples after the last, in counts: states, y.
-  [[nodiscard]] std::vector<LinearForm> correction_rows(int elapsed) const {
-    std::vector<LinearForm> rows;
-    if (design_->gap_gains.empty()) {  // of one level: x + k (y - x_1)
-      for (std::size_t i = 0; i < states(); ++i) {
-        rows.push_back(unit(i, states() + 1));
-        rows[i][states()] = plain_by_[i];
-        rows[i][0] -= plain_by_[i];
-      }
-    } else {
-      std::vector<double> given{column};
-      for (const double k : design_->gap_gains[static_cast<std::size_t>(elapsed - 1)]) {
-        given.push_back(k);
-      }
-      rows = rows_of("correct_by", given);
-    }
-    for (const std::size_t i : first_of_level) rows[i][states()] -= 1;
-    return rows;
-  }
+  [[nodiscard]] std::vector<LinearForm> correction_rows(int elapsed) const;
   /// A call as it moves the states, in counts: a row for each state, its columns states, arguments.
   [[nodiscard]] std::vector<LinearForm> rows_of(const char* name,
-                                                const std::vector<double>& given) const {
-    const RecordedCall& call = called(name);
-    const LinearCall forms = linear(call, given);
-    std::vector<LinearForm> rows;
-    for (std::size_t i = 0; i < states(); ++i) {
-      LinearForm row(states() + given.size(), 0.0);
-      const int at = call.next[numbers[i]];
-      if (at < 0)
-        row[i] = 1;
-      else
-        row = forms.of[static_cast<std::size_t>(at)];
-      row.resize(states() + given.size());
-      rows.push_back(row);
-    }
-    return rows;
-  }
+                                                const std::vector<double>& given) const;
   static constexpr double column = std::numeric_limits<double>::quiet_NaN();
 
  protected:
@@ -159,208 +81,25 @@ class FixedRecord {
   static constexpr std::int32_t least_gain = 4096;
   static constexpr int fine_parts = 1000000;  ///< added to the owner of a sum
 
-  [[nodiscard]] bool refuse(const char* field, double value, const char* rule, int index = -1) {
-    if (refusal.field == nullptr) refusal = {field, value, rule, index};
-    return false;
-  }
+  [[nodiscard]] bool refuse(const char* field, double value, const char* rule, int index = -1);
 
-  [[nodiscard]] const RecordedCall& called(const char* name) const {
-    for (std::size_t i = 0; i < design_->names.size(); ++i) {
-      if (design_->names[i].name == name) return design_->calls[i];
-    }
-    return design_->calls[0];
-  }
+  [[nodiscard]] const RecordedCall& called(const char* name) const;
   [[nodiscard]] LinearCall linear(const RecordedCall& call,
                                   const std::vector<double>& given) const {
     return {call, state_of_, design_->numbers, states(), given, design_->settings};
   }
 
-  bool checks() {
-    const auto& y = options_.y;
-    const auto& u = options_.u;
-    if (!(y.unit > 0) || std::isinf(y.unit))
-      return refuse("y.unit", y.unit, "must be finite and positive");
-    if (!(u.unit > 0) || std::isinf(u.unit))
-      return refuse("u.unit", u.unit, "must be finite and positive");
-    if (y.most < 1 || y.most > (1 << 24)) return refuse("y.most", y.most, "must be 1 .. 2^24");
-    if (u.most < 1 || u.most > (1 << 24)) return refuse("u.most", u.most, "must be 1 .. 2^24");
-    if (u.counter_bits != 0)
-      return refuse("u.counter_bits", u.counter_bits, "must be 0: u is no counter");
-    if (wraps_ && (y.counter_bits < 2 || y.counter_bits > 16)) {
-      return refuse("y.counter_bits", y.counter_bits, "must be 2 .. 16, or 0");
-    }
-    if (wraps_ && y.most >= (1 << (y.counter_bits - 1))) {
-      return refuse("y.most", y.most,
-                    "must be less than half the range of the counter: of a "
-                    "faster one nobody can say in which direction it went");
-    }
-    if (options_.innovation_bits != 16 && options_.innovation_bits != 32) {
-      return refuse("innovation_bits", options_.innovation_bits, "must be 16 or 32");
-    }
-    if (!design_->line.empty()) {
-      return refuse(
-          "observer", static_cast<double>(design_->line.size() - 1),
-          "is in DelayedInput, which is not written in fixed point: keep the u of earlier "
-          "samples yourself");
-    }
-    if (design_->gate.threshold > 0) {
-      return refuse("observer", design_->gate.threshold,
-                    "is in OutlierGate, which is not written in fixed point");
-    }
-    if (design_->predictive) {
-      return refuse("controller", 0, "is PredictiveAdrc, which is not written in fixed point");
-    }
-    if (design_->wrap.period > 0) {
-      return refuse("observer", design_->wrap.period,
-                    "is in WrappedOutput: in fixed point take the observer without it, and "
-                    "y.counter_bits");
-    }
-    if (design_->guard.on) {
-      return refuse("observer", design_->guard.trust,
-                    "is in Guarded, which is not written in fixed point");
-    }
-    if (design_->measured.on) {
-      return refuse("observer", design_->measured.paths[0].gain,
-                    "is in Measured, which is not written in fixed point");
-    }
-    if (!design_->map.lines.empty()) {
-      return refuse("observer", design_->map.lines[0][1],
-                    "is in MappedInput, which is not written in fixed point: give u the table of "
-                    "its effect yourself");
-    }
-    if (design_->known.on) {
-      return refuse("observer", 0, "is in KnownModel, which is not written in fixed point");
-    }
-    if (design_->law.kind != RunningLaw::none && !design_->law.settled) {
-      return refuse("observer", static_cast<double>(design_->law.age),
-                    "has gains that go on: let it settle first (AlgebraicEso), freeze the filter "
-                    "(RiccatiMode::frozen), or take a LinearEso");
-    }
-    if (design_->law.watches) {
-      return refuse("outlier_threshold", 1, "is not written in fixed point");
-    }
-    if ((options_.settings_for != nullptr || !options_.room_for.empty()) &&
-        design_->settings.empty()) {
-      return refuse("settings_in_struct", 0, "must be true for settings_for, here and there");
-    }
-    if (design_->loop.divider > 1) {
-      return refuse("measurement_divider", design_->loop.divider, "must be 1 in fixed point");
-    }
-    if (design_->error_based || design_->softens || design_->compensates) {
-      return refuse("controller", 0,
-                    "is error-based, softens or compensates: only Adrc from y up to order 2 is "
-                    "written in fixed point");
-    }
-    return true;
-  }
+  bool checks();
 
   /// The linear part.
-  bool takes_design() {
-    state_of_.assign(design_->members.size(), -1);
-    for (std::size_t i = 0; i < design_->members.size(); ++i) {
-      if (design_->members[i][0] != 'z') continue;
-      state_of_[i] = static_cast<int>(numbers.size());
-      numbers.push_back(i);
-    }
-    const std::size_t n = states();
-    const RecordedCall& call = called("observe");
-    const LinearCall forms = linear(call, {column, column});
-    const double of_u = options_.u.unit / options_.y.unit;
-    exact_a_.clear();
-    exact_by_.clear();
-    exact_bu_.clear();
-    for (std::size_t i = 0; i < n; ++i) {
-      const int at = call.next[numbers[i]];
-      if (at < 0 || !forms.is_linear(at)) {
-        return refuse("observer", static_cast<double>(i),
-                      "is not linear in its states, y and u: its gains depend on the innovation");
-      }
-      const LinearForm& form = forms.of[static_cast<std::size_t>(at)];
-      for (std::size_t j = 0; j < n; ++j) exact_a_.push_back(form[j]);
-      exact_by_.push_back(form[n]);
-      exact_bu_.push_back(form[n + 1] * of_u);
-    }
-    plain_by_ = exact_by_;
-    if (wraps_) {
-      for (std::size_t i = 0; i < n; ++i) {
-        if (design_->members[numbers[i]].compare(0, 2, "z1") == 0) {
-          exact_by_[i] -= 1;
-          first_of_level.push_back(i);
-        }
-      }
-    }
-    exact_estimates_.clear();
-    for (int row = 0; row < design_->size; ++row) {
-      const RecordedCall& estimate = called(("estimate_" + std::to_string(row)).c_str());
-      const LinearCall of(linear(estimate, {}));
-      const int at = estimate.outputs[0];
-      if (!of.is_linear(at)) return refuse("observer", row, "has an estimate that is not linear");
-      LinearForm c = of.of[static_cast<std::size_t>(at)];
-      c.resize(n);
-      for (double& x : c) x *= options_.y.unit;
-      exact_estimates_.push_back(c);
-    }
-    weights_ = weights();
-    worst_ = plain_ = WorstCase(static_cast<int>(n), exact_a_, weights_);
-    if (!worst_.stable()) return refuse("observer", 0, "does not decay within 4 million samples");
-    forced_.clear();
-    for (std::size_t i = 0; i < n; ++i) {
-      const auto sums = worst_.sums(unit(i, n), {exact_by_, exact_bu_});
-      forced_.push_back(sums[0].most(-options_.y.most, options_.y.most) +
-                        sums[1].most(-options_.u.most, options_.u.most));
-    }
-    return !design_->is_controller || takes_limits();
-  }
+  bool takes_design();
 
   /// Sizes of the states by which the norm is taken: what y does to them in 20,000 samples.
-  [[nodiscard]] std::vector<double> weights() const {
-    const std::size_t n = states();
-    std::vector<double> sizes(n, 1e-30);
-    std::vector<double> x = plain_by_;
-    for (int k = 0; k < 20000; ++k) {
-      std::vector<double> to(n, 0.0);
-      for (std::size_t i = 0; i < n; ++i) {
-        for (std::size_t j = 0; j < n; ++j) to[i] += exact_a_[i * n + j] * x[j];
-        sizes[i] += std::fabs(x[i]);
-      }
-      x = to;
-    }
-    return sizes;
-  }
+  [[nodiscard]] std::vector<double> weights() const;
 
-  static LinearForm unit(std::size_t i, std::size_t n) {
-    LinearForm form(n, 0.0);
-    form[i] = 1;
-    return form;
-  }
+  static LinearForm unit(std::size_t i, std::size_t n);
 
-  bool takes_limits() {
-    lower = design_->lower / options_.u.unit;
-    upper = design_->upper / options_.u.unit;
-    const double digit =
-        design_->single ? static_cast<double>(rounding<float>()) : rounding<double>();
-    for (const double count : {lower, upper}) {
-      if (std::fabs(count - std::nearbyint(count)) > 1e-6 + 4 * digit * std::fabs(count)) {
-        return refuse("u.unit", count, "must make the limits of the controller whole counts");
-      }
-    }
-    lower = std::nearbyint(lower);
-    upper = std::nearbyint(upper);
-    const double most = options_.u.most;
-    if (!(lower >= -most) || !(upper <= most)) {
-      return refuse("u.most", most, "must hold the limits of the controller in counts");
-    }
-    // A step as large as the range limits nothing.
-    if (design_->rate < design_->upper - design_->lower) rate = design_->rate / options_.u.unit;
-    const LinearCall forms = linear(called("law"), {column});
-    if (!forms.is_linear(called("law").outputs[0])) {
-      return refuse("controller", 0, "has a law that is not linear");
-    }
-    exact_law_ = forms.of[static_cast<std::size_t>(called("law").outputs[0])];
-    exact_law_.resize(states() + 1);
-    for (double& x : exact_law_) x *= options_.y.unit / options_.u.unit;
-    return true;
-  }
+  bool takes_limits();
 
   const RecordedDesign* design_;
   const FixedLayout* given_ = nullptr;
@@ -394,3 +133,7 @@ class FixedRecord {
 };
 
 }  // namespace esokit::detail
+
+#if defined(ESOKIT_HEADER_ONLY)
+#include <esokit/target/impl/fixed_record.ipp>
+#endif

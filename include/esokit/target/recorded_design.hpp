@@ -3,11 +3,9 @@
 /// observer, recorded from its own calls.
 #pragma once
 
-#include <algorithm>
 #include <array>
-#include <cctype>
-#include <cmath>
 #include <cstddef>
+#include <esokit/core/compiled.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/target/record_access.hpp>
 #include <esokit/target/recorded_numbers.hpp>
@@ -21,6 +19,7 @@
 #include <vector>
 
 namespace esokit {
+
 namespace detail {
 
 /// The rules for the options.
@@ -52,94 +51,44 @@ struct OfController {
     return c.observer();
   }
 };
+
 struct OfPredictive {
   template <class C>
   auto& operator()(C& c) const {
     return RecordAccess::observer_of(c);
   }
 };
+
 struct Itself {
   template <class O>
   auto& operator()(O& o) const {
     return o;
   }
 };
+
 struct NoName {
   template <class O, class Number>
   std::string operator()(const O&, const Number*) const {
     return {};
   }
 };
+
 /// @}
 
 /// Notes a call. @param arguments their names, with blanks between @return how many there are
-inline int note_call(RecordedDesign& design, std::string_view name, std::string_view arguments,
-                     bool has_output) {
-  std::vector<std::string> names;
-  while (!arguments.empty()) {
-    names.emplace_back(arguments.substr(0, arguments.find(' ')));
-    arguments.remove_prefix((std::min)(arguments.size(), names.back().size() + 1));
-  }
-  const int count = static_cast<int>(names.size());
-  design.names.push_back({std::string(name), std::move(names), has_output});
-  return count;
-}
+int note_call(RecordedDesign& design, std::string_view name, std::string_view arguments,
+              bool has_output);
 
 /// Names a number of the object that has perhaps a name. @param level of a state, or -1, in its
 /// row @param published its place among those, or -1 @param setting begins the name of a setting
 /// @return whether it is read from outside
-inline bool name_number(RecordedDesign& design, std::string name, int level, int row, bool first,
-                        int published, const char* setting) {
-  if (level >= 0) {
-    name = "z" + std::to_string(row + 1);
-    if (level > 0) name += "_level" + std::to_string(level + 1);
-    if (first) design.first_state = name;
-  }
-  if (published >= 0) name = "published_" + std::to_string(published);
-  const bool live = name[0] == 'z' || name[0] == 'p' || name == "u_applied" || name == "u_given" ||
-                    name == "u_last" ||
-                    (design.options.watched && (name == "innovation" || name == "u_asked")) ||
-                    (design.guard.on && name == "innovation");
-  const std::string number = std::to_string(design.members.size());
-  if (setting != nullptr && name.empty()) name = setting + number;
-  design.members.push_back(name.empty() ? "x" + number : name);
-  return live;
-}
+bool name_number(RecordedDesign& design, std::string name, int level, int row, bool first,
+                 int published, const char* setting);
 
 /// Where the law of an angle subtracts an estimate from the reference, the difference becomes its
 /// argument: the text takes off whole turns. A law on physical estimates gets a reference without
 /// them. @return false where it does not
-inline bool take_angle(RecordedDesign& design) {
-  for (std::size_t i = 0; i < design.names.size(); ++i) {
-    if (design.names[i].name != "law") continue;
-    auto& list = design.calls[i].list.instructions;
-    const int of_call = static_cast<int>(design.members.size());
-    int reference = -1;
-    int difference = -1;
-    for (std::size_t k = 0; k < list.size(); ++k) {
-      const Instruction& one = list[k];
-      const int at = static_cast<int>(k);
-      if (one.operation == Operation::argument) {
-        if (one.a == of_call) reference = at;
-        continue;
-      }
-      if (reference < 0 || (one.a != reference && one.b != reference && one.c != reference)) {
-        continue;
-      }
-      const bool subtracts = one.operation == Operation::subtract && one.a == reference &&
-                             list[static_cast<std::size_t>(one.b)].operation == Operation::argument;
-      if (!subtracts || difference >= 0) return false;
-      difference = at;
-    }
-    if (difference < 0) return false;
-    Instruction& one = list[static_cast<std::size_t>(difference)];
-    design.wrap.angle =
-        design.members[static_cast<std::size_t>(list[static_cast<std::size_t>(one.b)].a)];
-    one = {.operation = Operation::argument, .a = of_call};
-    design.names[i].arguments[0] = "error";
-  }
-  return true;
-}
+bool take_angle(RecordedDesign& design);
 
 /// Records a subject without its adapter.
 /// @tparam Subject the observer or controller @tparam Observer its observer, perhaps itself
@@ -588,3 +537,7 @@ Expected<RecordedDesign, Error<typename C::scalar_type>> recorded_design(
 
 }  // namespace detail
 }  // namespace esokit
+
+#if defined(ESOKIT_HEADER_ONLY)
+#include <esokit/target/impl/recorded_design.ipp>
+#endif
