@@ -177,10 +177,12 @@ TEST(ActuatorMap, LanesOfAPackHaveTheirOwnCurve) {
                                             map_of<float>({})};
     P x;
     for (int lane = 0; lane < 4; ++lane) {
-      auto& one = plain[static_cast<std::size_t>(lane)] =
-          map_of<float>(random_curve<float>(random));
+      const auto curve = random_curve<float>(random);
+      auto& one = plain[static_cast<std::size_t>(lane)] = map_of<float>(curve);
       detail::set_lane(packed, one, lane);
       x[lane] = static_cast<float>(random.uniform(-9, 9));
+      // Where lines meet, each has a digit of its own.
+      if (curve.points > 0 && random.index(2) == 0) x[lane] = curve.input[0];
     }
     const P effect = packed.effect(x);
     const P input = packed.input(x);
