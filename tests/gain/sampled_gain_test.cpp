@@ -430,6 +430,82 @@ TEST(BridgedSteps, ASquareFallsInEveryStepUpToTheReach) {
   falls<ReducedSampledPoles<4, double>, 4>({1, -2.7453, 8.4283, 2.7117, -22.494, 8.7997});
 }
 
+template <class Poles, int Size>
+constexpr auto recovery_at(double x) {
+  using esokit::detail::recovery_of;
+  if constexpr (requires(Poles poles) { poles.contraction; }) {
+    return recovery_of<Size, esokit::detail::equal_steps, esokit::detail::equal_recovery>(
+        std::exp(-x));
+  } else if constexpr (requires(Poles poles) { poles.rest; }) {
+    return recovery_of<Size, esokit::detail::reduced_steps, esokit::detail::reduced_recovery>(
+        std::exp(-x));
+  } else {
+    return recovery_of<Size, esokit::detail::half_gain_steps, esokit::detail::half_gain_recovery>(
+        std::exp(-x));
+  }
+}
+
+/// What is due after a long step, see GapRecovery: V of an ordinary step with this discount falls
+/// by it, and by no more than an ordinary correction takes where a step counts as one.
+template <class Poles, int Size>
+void recovers(double discount) {
+  constexpr int first = requires(Poles poles) { poles.rest; }
+  ? 1 : 0;
+  constexpr int count = Size - first;
+  using Square = esokit::Matrix<double, count, count>;
+  const auto step = [](double x) {
+    const auto whole = step_error<Poles, Size>(x);
+    Square rest;
+    for (int i = 0; i < count; ++i) {
+      for (int j = 0; j < count; ++j) {
+        rest(i, j) = whole(i + first, j + first) - (i == j ? 1 : 0);
+      }
+    }
+    return rest;
+  };
+  double most = 0;  // of what is needed, of what is due
+  for (const double x : {0.01, 0.07, 0.2, 0.46, 0.9, 1.7}) {
+    SCOPED_TRACE(::testing::Message() << "N = " << Size << ", omega_o T = " << x);
+    const Square one = step(x);
+    // The gain is what the first error loses, in a step without time.
+    esokit::Vector<double, count> k;
+    const auto whole = step_error<Poles, Size>(x);
+    for (int i = 0; i < count; ++i) k(i) = (i + first == 0 ? 1 : 0) - whole(i + first, 0);
+    const double rate = discount * x;
+    const auto square =
+        esokit::detail::FallingSquare<count, double>::make(one, k * k.transpose(), rate);
+    ASSERT_TRUE(square);
+    const auto recovery = recovery_at<Poles, Size>(x);
+    for (int samples = 2; samples <= 65001; samples += 1 + samples / 12) {
+      const Square over = step(samples * x);
+      const int due = recovery.due_after(static_cast<unsigned>(samples));
+      if (due < 0) {
+        EXPECT_TRUE(square->falls(over, -std::expm1(-rate))) << samples;
+        continue;
+      }
+      // `growth` may be too large by the root of order 16 of the number of states.
+      const double grown = std::log(square->growth(over)) - std::log(count) / 16;
+      EXPECT_LE(grown, due * rate) << samples;
+      if (due > 20) most = std::max(most, grown / (due * rate));
+    }
+  }
+  EXPECT_GT(most, 0.8);
+}
+
+TEST(BridgedSteps, WhatIsDueAfterALongStepIsEnough) {
+  recovers<EqualSampledPoles<3, double>, 3>(1.1);
+  recovers<EqualSampledPoles<4, double>, 4>(1.2);
+  recovers<EqualSampledPoles<5, double>, 5>(1.1);
+  recovers<SampledPolePairs<3, double>, 3>(0.9);
+  recovers<SampledPolePairs<4, double>, 4>(0.9);
+  recovers<ReducedSampledPoles<3, double>, 3>(1.1);
+  recovers<ReducedSampledPoles<4, double>, 4>(1.1);
+  // Two states: any sequence of steps decays. From eight on nothing is proven.
+  EXPECT_EQ((recovery_at<EqualSampledPoles<2, double>, 2>(0.1).due_after(65001)), -1);
+  EXPECT_EQ((recovery_at<EqualSampledPoles<8, double>, 8>(0.1).due_after(9)),
+            esokit::detail::GapRecovery<double>::never);
+}
+
 /// Largest spectral radius of A(a) A(b)^k, k = 1 .. 5, of all steps up to `longest`.
 template <class Poles, int Size>
 double worst_pattern(double longest) {

@@ -595,7 +595,7 @@ struct Laws : LawSuite {
     const double b0 = 16 / period;
     const Real u = input(0.25);
     const StepStatus late =
-        make(0.5, b0)->max_gap() > 0 ? StepStatus::gap_bridged : StepStatus::restarted;
+        make(0.5, b0)->longest_gap() > 0 ? StepStatus::gap_bridged : StepStatus::restarted;
     for (const Real bad : {huge(), -huge()}) {
       AnyObserver hit = warm(0.5, b0);
       AnyObserver missing = hit;
@@ -898,6 +898,83 @@ struct Laws : LawSuite {
     }
   }
 
+  /// Errors decay in any sequence of gaps, also of those beyond max_gap() that are as near together
+  /// as they may be without a restart: two lengths in turn, random ones, and the worst found step
+  /// by step, with bridged gaps in between.
+  void long_gaps_are_forgotten() const {
+    Random random(43);
+    for (const double omega_t : {0.1, 0.46, 1.3}) {
+      if (!kind.make(settings(omega_t))) continue;
+      for (const int asked : {40, 400}) {
+        const AnyObserver start = make(omega_t, gain, asked);
+        const int bridged = start->max_gap(), longest = start->longest_gap();
+        if (longest <= bridged) continue;
+        std::vector<int> gaps;  // beyond max_gap
+        for (int gap = bridged + 1; gap < longest; gap = gap * 7 / 4 + 1) gaps.push_back(gap);
+        gaps.push_back(longest);
+        const auto play = [&](const char* name, auto&& next) {
+          AnyObserver observer = start;
+          observer->reset(
+              state([](int r) { return r % 2 == 0 ? 1 : -1; }, period / std::min(1.0, omega_t)));
+          for (int k = 0; k < 2 * N; ++k) bridge(observer, 0);
+          const Real before = error_size(observer, omega_t);
+          double time = 0;
+          for (int cycle = 0; cycle < 40 || time < 60 / kind.slowest; ++cycle) {
+            const int gap = next(observer, cycle);
+            bridge(observer, gap);
+            time += omega_t * (gap + 1);
+            while (observer->recovering() > 0) {
+              const bool bridges = random.index(10) == 0 && bridged > 0;
+              bridge(observer, bridges ? 1 + random.index(bridged) : 0);
+              time += omega_t;
+              if (time > 1e4) return;  // the bridged gaps made more due
+            }
+          }
+          EXPECT_LE(error_size(observer, omega_t), 1e-3 * before + 1e-12)
+              << name << ", " << omega_t << ", gaps to " << longest;
+        };
+        for (const int a : gaps) {
+          play("two", [&](const AnyObserver&, int k) { return k % 2 == 0 ? a : gaps.back(); });
+        }
+        play("random", [&](const AnyObserver&, int) {
+          return gaps[static_cast<std::size_t>(random.index(static_cast<int>(gaps.size())))];
+        });
+        play("worst", [&](const AnyObserver& observer, int) {
+          int worst = gaps[0];
+          Real most = -1;
+          for (const int gap : gaps) {
+            AnyObserver tried = observer;
+            bridge(tried, gap);
+            for (int due = tried->recovering(); due > 0; --due) bridge(tried, 0);
+            if (const Real size = error_size(tried, omega_t); size > most) {
+              most = size;
+              worst = gap;
+            }
+          }
+          return worst;
+        });
+        // A second one restarts while corrections are due.
+        AnyObserver observer = start;
+        bridge(observer, longest);
+        if (observer->recovering() == 0) continue;
+        for (int i = 0; i <= bridged + 1; ++i) observer->predict(0);
+        EXPECT_EQ(observer->correct(1), StepStatus::restarted);
+        EXPECT_EQ(observer->recovering(), 0);
+        // Each correction without a gap counts, and a retune begins anew.
+        observer = start;
+        bridge(observer, longest);
+        const int due = observer->recovering();
+        if (due < 2) continue;
+        bridge(observer, 0);
+        EXPECT_EQ(observer->recovering(), due - 1);
+        observer->update(0, 0);
+        EXPECT_EQ(observer->recovering(), due - 2);
+        ASSERT_EQ(kind.retune(observer, settings(omega_t, gain, asked)), "accepted");
+        EXPECT_EQ(observer->recovering(), due);
+      }
+    }
+  }
+
   void long_gap_restarts() const {
     constexpr int max_gap = 2;
     const Real u = input(0.5);
@@ -962,6 +1039,7 @@ std::vector<NamedLaw> LawSuite::laws() const {
   ESOKIT_LAW(gap_gain_is_that_of_longer_sample);
   ESOKIT_LAW(recurring_gaps_are_stable);
   ESOKIT_LAW(any_sequence_of_gaps_decays);
+  ESOKIT_LAW(long_gaps_are_forgotten);
   ESOKIT_LAW(long_gap_restarts);
 #undef ESOKIT_LAW
   return laws;

@@ -362,7 +362,11 @@ void gaps_decay(const Observer& made) {
     ASSERT_EQ(observer.correct(0.0), every > 1 ? StepStatus::gap_bridged : StepStatus::ok);
   }
   EXPECT_LT(corrections, 20000) << "at random";
+  while (observer.recovering() > 0) (void)observer.update(0.0, 0.0);
   for (int i = 0; i < made.max_gap() + 2; ++i) (void)observer.predict(0.0);
+  EXPECT_EQ(observer.correct(0.0),
+            made.longest_gap() > made.max_gap() ? StepStatus::gap_bridged : StepStatus::restarted);
+  for (int i = 0; i < made.longest_gap() + 2; ++i) (void)observer.predict(0.0);
   EXPECT_EQ(observer.correct(0.0), StepStatus::restarted);
 }
 

@@ -451,7 +451,7 @@ TEST(ModelGain, RandomGapsThatAreBridgedLetErrorsDecay) {
   }
 }
 
-TEST(ModelGain, ALongerGapRestarts) {
+TEST(ModelGain, ALongerGapIsBridgedIfNoCorrectionIsDue) {
   auto observer =
       ResonatorEso<2>::make(
           {.observer_bandwidth = 200.0, .input_gain = 1.0, .sample_time = kT, .model = {kW}})
@@ -465,7 +465,23 @@ TEST(ModelGain, ALongerGapRestarts) {
   };
   EXPECT_EQ(status_after(1), StepStatus::gap_bridged);
   EXPECT_EQ(status_after(most), StepStatus::gap_bridged);
-  EXPECT_EQ(status_after(most + 1), StepStatus::restarted);
+  const int longest = observer.longest_gap();
+  EXPECT_EQ(longest, 100);
+  for (const int first : {most + 1, longest}) {  // one is harmless, a second one is not yet
+    EXPECT_EQ(status_after(first), StepStatus::gap_bridged);
+    auto after = observer;
+    for (int k = 0; k < first; ++k) (void)after.predict(0.0);
+    (void)after.update(1.0, 0.0);
+    const int due = after.recovering();
+    EXPECT_GT(due, 0);
+    for (const bool waits : {false, true}) {
+      auto copy = after;
+      for (int k = 0; k < (waits ? due : due - 1); ++k) (void)copy.update(1.0, 0.0);
+      for (int k = 0; k < most + 1; ++k) (void)copy.predict(0.0);
+      EXPECT_EQ(copy.update(1.0, 0.0), waits ? StepStatus::gap_bridged : StepStatus::restarted);
+    }
+  }
+  EXPECT_EQ(status_after(longest + 1), StepStatus::restarted);
 }
 
 TEST(ModelGain, AGapShorterThanTheModelAllowsIsKept) {

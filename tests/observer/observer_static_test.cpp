@@ -13,9 +13,9 @@ using esokit::CascadeEso;
 using esokit::LinearEso;
 using esokit::StepStatus;
 
-// Three states, three gains, pole, b0 and its scaled form, T and 1/T, innovation, last input, two
+// Three states, three gains, pole, b0 and its scaled form, T and 1/T, innovation, last input, four
 // counters.
-static_assert(sizeof(LinearEso<2, float>) <= 56);
+static_assert(sizeof(LinearEso<2, float>) <= 60);
 static_assert(sizeof(LinearEso<2>) <= 112);
 static_assert(sizeof(CascadeEso<2, 1, float>) == sizeof(LinearEso<2, float>));
 

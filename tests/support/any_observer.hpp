@@ -43,6 +43,8 @@ class AnyObserver {
     [[nodiscard]] virtual Real sample_time() const = 0;
     [[nodiscard]] virtual int missed() const = 0;
     [[nodiscard]] virtual int max_gap() const = 0;
+    [[nodiscard]] virtual int longest_gap() const = 0;
+    [[nodiscard]] virtual int recovering() const = 0;
     [[nodiscard]] virtual int size() const = 0;
     [[nodiscard]] virtual int levels() const = 0;
   };
@@ -96,6 +98,8 @@ class AnyObserver {
     [[nodiscard]] Real sample_time() const override { return observer.sample_time(); }
     [[nodiscard]] int missed() const override { return observer.missed(); }
     [[nodiscard]] int max_gap() const override { return observer.max_gap(); }
+    [[nodiscard]] int longest_gap() const override { return observer.longest_gap(); }
+    [[nodiscard]] int recovering() const override { return observer.recovering(); }
     [[nodiscard]] int size() const override { return Observer::size; }
     [[nodiscard]] int levels() const override { return Observer::levels; }
 

@@ -44,6 +44,7 @@ enum class Law {
   gap_gain_is_that_of_longer_sample,
   recurring_gaps_are_stable,
   any_sequence_of_gaps_decays,
+  long_gaps_are_forgotten,
   long_gap_restarts,
 };
 

@@ -8,6 +8,7 @@
 #include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
+#include <esokit/observer/half_gain_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <target/written.hpp>
 
@@ -122,6 +123,26 @@ TEST(CRunning, OfGuards) {
   const auto without_leak = [](auto& settings) { settings.observer.leak_time = 0; };
   equals_changed<Adrc<Guarded<LinearEso<2, double>>, ErrorBased>>(30000, 651, "gcc -std=c99",
                                                                   without_leak);
+}
+
+/// Gaps beyond max_gap(), and more of them while corrections are due.
+TEST(CRunning, OfLongGaps) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  const std::string gcc = "gcc -std=c99";
+  const auto fast = [](double bandwidth) {
+    return [=](auto& settings) {
+      auto& chain = innermost(settings);
+      chain.observer_bandwidth = decltype(chain.sample_time)(bandwidth);
+      chain.max_gap = 20;
+    };
+  };
+  equals_changed<Adrc<LinearEso<2, double>>>(30000, 1401, gcc, fast(500));
+  equals_changed<Adrc<LinearEso<3, float>>>(30000, 1411, gcc, fast(160));
+  equals_changed<Adrc<OutlierGate<HalfGainEso<2, double>>>>(30000, 1421, gcc, fast(500));
+  equals_changed<Adrc<Guarded<LinearEso<2, float>>>>(30000, 1431, gcc, fast(500));
+  equals_changed<Adrc<DelayedInput<WrappedOutput<CascadeEso<2, 2, double>>, 3>>>(30000, 1441, gcc,
+                                                                                 fast(300));
+  adopts<Adrc<LinearEso<2, double>>>(1451, true, 500);
 }
 
 TEST(CRunning, CompilesWithOtherCompilers) {

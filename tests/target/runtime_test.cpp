@@ -132,7 +132,11 @@ detail::RecordedDesign design_of(Random& random) {
   d.law.watches = law == 2 && is();
   d.gain_is_kept = d.predictive || is();
   const bool stands = law == 0;
-  if (stands) d.gap_gains = {{0.5, 0.25, 0.125}, {0.75, 0.5, 0.25}};
+  if (stands) {
+    d.gap_gains = {{0.5, 0.25, 0.125}, {0.75, 0.5, 0.25}};
+    d.recovery = {0, 5};
+    d.recovers = is();
+  }
   if (!d.predictive) {
     if (is()) d.line = {0, 0, 0};
     if (!d.law.watches && is()) d.gate = {.threshold = 1, .running_factor = 6, .most_in_a_row = 5};

@@ -705,15 +705,20 @@ void refuses_under_fast_math(bool silent = false) {
 }
 
 /// Other settings while it runs, as by `adopt`. @param is_slow whether there is a limit of rate
+/// @param bandwidth of the observer, at first and after a change; 0: that of the others, then 20
 template <class C>
-void adopts(std::uint64_t seed, bool is_slow) {
+void adopts(std::uint64_t seed, bool is_slow, double bandwidth = 0) {
   SCOPED_TRACE(testing::internal::GetTypeName<C>());
   using V = typename C::scalar_type;
   auto settings = config<C>(8);
   const V rate = is_slow ? V(60) : esokit::Limits<V>{}.rate;
   settings.limits.rate = rate;
+  if (bandwidth > 0) {
+    innermost(settings).observer_bandwidth = V(bandwidth);
+    innermost(settings).max_gap = 20;
+  }
   const C first = C::make(settings).value();
-  innermost(settings).observer_bandwidth = V(20);
+  innermost(settings).observer_bandwidth = bandwidth > 0 ? V(0.7 * bandwidth) : V(20);
   if constexpr (requires { settings.controller_bandwidth; }) settings.controller_bandwidth = V(3);
   settings.limits = {V(-1), V(1.5), rate};
   const C second = C::make(settings).value();
@@ -758,6 +763,7 @@ void adopts(std::uint64_t seed, bool is_slow) {
   Random random(seed);
   V r(1);
   int limited = 0;
+  int lost = 0;
   for (int k = 0; k < 30000 && !testing::Test::HasFailure(); ++k) {
     plant.step(static_cast<double>(mine.output()));
     if (random.index(60) == 0) r = static_cast<V>(random.uniform(-4, 4));
@@ -768,6 +774,8 @@ void adopts(std::uint64_t seed, bool is_slow) {
       EXPECT_EQ(applied(state.data(), told), 0u);
       (void)mine.applied(told);
     }
+    if (lost > 0 && lost-- > 0) y = hidden_nan<V>();
+    if (bandwidth > 0 && random.index(30) == 0) lost = random.index(15);
     const int set = random.index(100);
     if (set < 2) {
       EXPECT_TRUE(mine.adopt(set == 0 ? first : second));

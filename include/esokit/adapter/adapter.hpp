@@ -93,6 +93,14 @@ requires(detail::goes_into_a_loop<Observer>()) class Adapter
     return observer_.equilibrium(y, u);
   }
 
+  [[nodiscard]] constexpr int longest_gap() const noexcept requires requires(const Observer& o) {
+    o.longest_gap();
+  }
+  { return observer_.longest_gap(); }
+  [[nodiscard]] constexpr auto recovering() const noexcept requires requires(const Observer& o) {
+    o.recovering();
+  }
+  { return observer_.recovering(); }
   [[nodiscard]] constexpr bool restarts() const noexcept requires RestartingObserver<Observer> {
     return observer_.restarts();
   }

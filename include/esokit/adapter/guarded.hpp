@@ -332,6 +332,7 @@ requires(detail::goes_into_a_loop<Observer>()) class Guarded
              Guards(observer.model()),
              config.unit,
              static_cast<std::uint16_t>(config.release_samples)} {
+    detail::GuardAccess::restart_after_long_gaps(observer_);
     set_weights();
     set_limit();
   }

@@ -31,6 +31,11 @@ struct GuardAccess {
       return o;
     }
   }
+  /// What is due after a long gap is proven for corrections that count in full.
+  template <class O>
+  static constexpr void restart_after_long_gaps(O& o) noexcept {
+    innermost(o).longest_gap_ = innermost(o).max_gap_;
+  }
   /// The scaled states of the observer, level by level.
   template <class O>
   static constexpr auto& states(O& o) noexcept {

@@ -31,7 +31,8 @@ requires(detail::goes_into_a_loop<Observer>()) struct OutlierGateConfig {
 /// the last correction (D if only every D-th sample has a measurement). The gate never stays shut:
 /// after `most_in_a_row` rejected measurements it opens and accepts everything until as many in a
 /// row are within the limit. So it follows a true step of y, of any size, after `most_in_a_row`
-/// samples, or after max_gap() if fewer: then the observer restarts. It begins open, also by reset.
+/// samples, or after longest_gap() if fewer: then the observer restarts. It begins open, also by
+/// reset.
 ///
 /// It can be combined with the other adapters; WrappedOutput must be outside, because it determines
 /// the turn of y. ExtendedStateFilter has its own gate, which uses the variance of the innovation.

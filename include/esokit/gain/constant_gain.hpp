@@ -15,7 +15,8 @@ template <int Size, Scalar S, class Placement = EqualPoles>
 class ConstantGain {
  public:
   /// What the law can do besides `gain`.
-  static constexpr GainLawTraits traits{.kind = GainKind::preset, .bridges_gaps = true};
+  static constexpr GainLawTraits traits{
+      .kind = GainKind::preset, .bridges_gaps = true, .recovers = true};
   using Spec = typename Placement::template Spec<Size, LaneScalar<S>>;  ///< bandwidth or poles
   template <class T>
   using with_scalar = ConstantGain<Size, T, Placement>;  ///< the same with another scalar
@@ -43,6 +44,9 @@ class ConstantGain {
     ConstantGain law;
     law.poles_ = Placement::template sample<Size, S>(spec, sample_time);
     law.gain_ = current_gain<Size, S>(law.poles_.weights());
+    if constexpr (ListsPoles<Placement>) {
+      law.proven_ = Placement::template recovery<Size, S>(law.poles_);
+    }
     // The last gain is prod(1 - rho_i) / (N-1)!, the smallest one for slow poles.
     rules.representable(field, Placement::template representative<Size, S>(spec),
                         law.gain_[Size - 1],
@@ -68,22 +72,39 @@ class ConstantGain {
   /// The largest number of missing samples, at most `asked`, up to which errors decay in any
   /// sequence of gaps.
   [[nodiscard]] constexpr int longest_gap(int asked) const noexcept {
-    if constexpr (requires { Placement::template longest_step<Size, S>(poles_); }) {
-      const int longest = Placement::template longest_step<Size, S>(poles_);
-      return asked < longest ? asked : longest - 1;
-    } else {
-      return 0;
-    }
+    const int longest = proven().longest_step;
+    return asked < longest ? asked : longest - 1;
+  }
+
+  /// What a correction after `samples` means for the next gap beyond `longest_gap`, see
+  /// GainLawTraits.
+  [[nodiscard]] constexpr int recovery(unsigned samples) const noexcept {
+    return proven().due_after(samples);
   }
 
  private:
   friend struct detail::LaneAccess;
-  static constexpr int data_members = 2;
+  static constexpr int data_members = 3;
 
   ConstantGain() = default;
 
+  /// By a bandwidth it takes some products to find; of a list of poles it is kept.
+  [[nodiscard]] constexpr auto proven() const noexcept {
+    if constexpr (ListsPoles<Placement>) {
+      return proven_;
+    } else if constexpr (requires { Placement::template recovery<Size, S>(poles_); }) {
+      return Placement::template recovery<Size, S>(poles_);
+    } else {
+      return Recovery{};
+    }
+  }
+
+  using Recovery = detail::GapRecovery<detail::TableScalar<S>>;
+  struct Nothing {};
   ScaledGain<Size, S> gain_{};
   Lanes<typename Placement::template Sampled<Size, LaneScalar<S>>, S> poles_{};
+  [[no_unique_address]] std::conditional_t<ListsPoles<Placement>, Lanes<Recovery, S>, Nothing>
+      proven_{};
 };
 
 template <int Size, Scalar S, class Placement = EqualPoles, int MostBridged = 101>

@@ -6,6 +6,7 @@
 #include <esokit/core/check.hpp>
 #include <esokit/core/declared.hpp>
 #include <esokit/core/scalar.hpp>
+#include <esokit/gain/bridged_steps.hpp>
 #include <esokit/gain/sampled_gain.hpp>
 #include <utility>
 
@@ -49,9 +50,15 @@ struct GainLawTraits {
   /// `gap_gain(e, samples) const`: the gain if `samples` (unsigned) > 1 sample times have passed
   /// since the last correction, and `longest_gap(asked) const`: how many missing samples the law
   /// bridges, at most `asked`, so that errors decay in any sequence of gaps; after more the
-  /// observer restarts. Without them `gain(e)` is used: a constant gain then diverges in recurring
-  /// gaps. A law that follows time in `advance()` does not need these hooks.
+  /// observer restarts, or see `recovers`. Without them `gain(e)` is used: a constant gain then
+  /// diverges in recurring gaps. A law that follows time in `advance()` does not need these hooks.
   bool bridges_gaps = false;
+
+  /// `recovery(samples) const`: what a correction with `gap_gain` after `samples` means for the
+  /// next gap beyond `longest_gap`. -1: nothing, and it counts; else the ordinary corrections that
+  /// have to come before it, or 2000000000 if such a gap restarts the observer, as all do without
+  /// it.
+  bool recovers = false;
 
   /// `gain(e)` may be called with an e that is not finite (the result is then not used); this saves
   /// the observer a test.
@@ -84,6 +91,7 @@ concept GainOf = std::convertible_to<Gain, ScaledGain<Size, S>>;
        { fixed.gap_gain(e, 1u) } noexcept -> GainOf<Size, S>;                                     \
        { fixed.longest_gap(1) } noexcept -> std::same_as<int>;)                                   \
   MISTAKEN(bridge_gap) MISTAKEN(gain_for_gap)                                                     \
+  HOOK(Recovers, recovers, recovery, { fixed.recovery(1u) } noexcept -> std::same_as<int>;)       \
   HOOK(Preset, kind == GainKind::preset, gain_before_measurement,                                 \
        { fixed.gain_before_measurement() } noexcept -> GainOf<Size, S>;)                          \
   MISTAKEN(preset_gain)                                                                           \
@@ -140,6 +148,34 @@ constexpr int bridged_gap(const Laws& laws, int asked) noexcept {
     for (const auto& law : laws) asked = law.longest_gap(asked);
   }
   return asked;
+}
+
+/// What a correction after `samples` means for the next long gap, see GainLawTraits::recovers.
+template <class Laws>
+constexpr int recovery_after(const Laws& laws, unsigned samples) noexcept {
+  int most = GapRecovery<double>::never;
+  if constexpr (gain_law_traits<typename Laws::value_type>.recovers) {
+    most = -1;
+    for (const auto& law : laws) {
+      const int due = law.recovery(samples);
+      most = due > most ? due : most;
+    }
+  }
+  return most;
+}
+
+/// Missing samples after which a correction is possible at all, at most `asked`.
+template <class Laws>
+constexpr int predicted_gap(const Laws& laws, int asked) noexcept {
+  int gap = bridged_gap(laws, asked);
+  for (int more = 1 << 16; more > 0; more /= 2) {
+    const int longer = gap + more;
+    if (longer <= asked &&
+        recovery_after(laws, static_cast<unsigned>(longer) + 1u) < GapRecovery<double>::never) {
+      gap = longer;
+    }
+  }
+  return gap;
 }
 
 }  // namespace detail

@@ -54,6 +54,12 @@ struct SampledPolePairs {
     return result;
   }
 
+  /// abs(rho_1)^2. Of half gains it is exp(-omega_o T), and that of all poles.
+  [[nodiscard]] constexpr S decay() const noexcept {
+    const auto& [real, imaginary] = pairs[0];
+    return (S(1) - real) * (S(1) - real) + imaginary * imaginary;
+  }
+
   /// beta_0 .. beta_N of prod_i (delta + a_i) = sum_j beta_j delta^(N-j).
   [[nodiscard]] constexpr Array<S, Size + 1> symmetric() const noexcept { return product<false>(); }
 
@@ -112,13 +118,11 @@ struct HalfGainPoles : BandwidthPlacement {
     return poles;
   }
 
-  /// The longest step after which errors decay in any sequence of steps, in samples.
+  /// After which steps over several samples errors decay.
   template <int Size, PlainScalar S>
-  static constexpr int longest_step(const SampledPolePairs<Size, S>& poles) noexcept {
-    // All poles have the magnitude exp(-omega_o T / 2).
-    const auto& [real, imaginary] = poles.pairs[0];
-    return detail::longest_step<Size, detail::half_gain_steps>(
-        S((S(1) - real) * (S(1) - real) + imaginary * imaginary));
+  static constexpr auto recovery(const SampledPolePairs<Size, S>& poles) noexcept {
+    return detail::recovery_of<Size, detail::half_gain_steps, detail::half_gain_recovery>(
+        poles.decay());
   }
 
   /// Exactly half the gain of the bandwidth parameterisation. @return l, N x 1, row i in 1/s^(i+1)

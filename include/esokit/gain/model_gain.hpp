@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstdint>
 #include <esokit/core/type_tag.hpp>
 #include <esokit/gain/constant_gain.hpp>
 #include <esokit/gain/gain_law.hpp>
@@ -37,6 +38,10 @@ struct PartDesign {
   static constexpr int count = gain_of_step(Longest) + 1;
   Array<ScaledGain<Size, S>, count> gains{};
   int longest_step = 0;  ///< longest step that is bridged, samples; 0: the poles cannot be placed
+  int counted = 1;       ///< longest step that counts as an ordinary correction
+  /// What is due after longer ones than longest_step, by the index of the gain.
+  Array<std::uint16_t, count> due{};
+  static constexpr std::uint16_t never = 65535;  ///< in it: nothing is proven
 
   /// True if every error decays with this gain.
   static bool decays(const Matrix<S, Size, Size>& step, const Array<S, Size>& output,
@@ -119,6 +124,7 @@ struct PartDesign {
       least = least + S(1e-6) * gain[i] * gain[i];
     }
     step = in_units(step, units);
+    due.fill(never);
     const Square sample = corrected(step, output, gain);
     // Which V suits best depends on how far the poles are apart. A step in which it rises is added
     // to the sum of which P consists; that lets V fall there, and rise elsewhere. What the gain
@@ -130,7 +136,7 @@ struct PartDesign {
         const S rate = share * decay;
         const auto square = FallingSquare<Size, S>::make(sample, spread, rate);
         if (!square) break;
-        const Square rising = find_gap_gains(*square, step, output, units);
+        const Square rising = find_gap_gains(*square, step, output, units, rate);
         spread = spread + (rising * square->covariance() * rising.transpose()) * rate;
       }
     }
@@ -139,8 +145,9 @@ struct PartDesign {
   /// The same with a given V. Nothing changes if it bridges no more than what was found before.
   /// @return (I - k C) Phi of the first step in which V rises
   Square find_gap_gains(const FallingSquare<Size, S>& square, const Square& step,
-                        const Array<S, Size>& output, const Array<S, Size>& units) {
+                        const Array<S, Size>& output, const Array<S, Size>& units, const S& rate) {
     auto found = gains;
+    bool best = false;   // of those that were looked at
     Square over = step;  // Phi^M - I of the last step that was looked at
     Square error;
     S noise(1.0);
@@ -177,10 +184,52 @@ struct PartDesign {
       if (samples - 1 > longest_step) {
         longest_step = samples - 1;
         gains = found;
+        best = true;
       }
-      if (samples < next) return error + Square::Identity();
+      if (samples < next) break;
     }
-    return error;
+    if (best || longest_step == 1) find_recovery(square, step, output, units, rate, noise);
+    return error + Square::Identity();
+  }
+
+  /// Gains of longer steps than longest_step, and what is due after them. @param noise R
+  void find_recovery(const FallingSquare<Size, S>& square, const Square& step,
+                     const Array<S, Size>& output, const Array<S, Size>& units, const S& rate,
+                     const S& noise) {
+    using std::expm1;
+    using std::log;
+    due.fill(never);
+    counted = 1;
+    Square over = step;
+    for (int samples = 2; samples <= Longest; ++samples) {
+      over = joined(over, step);
+      const int i = gain_of_step(static_cast<unsigned>(samples));
+      auto& kept = gains[static_cast<std::size_t>(i)];
+      if (samples > longest_step && samples == first_step(i)) {
+        const Square phi = over + Square::Identity();
+        kept = elements(phi * square.covariance() * phi.transpose() * column(output));
+        S innovation = noise;
+        for (std::size_t row = 0; row < Size; ++row)
+          innovation = innovation + output[row] * kept[row];
+        for (std::size_t row = 0; row < Size; ++row)
+          kept[row] = kept[row] / innovation * units[row];
+      }
+      Array<S, Size> gain = kept;
+      for (std::size_t row = 0; row < Size; ++row) gain[row] = gain[row] / units[row];
+      const Square error = corrected(over, output, gain);
+      if (samples == counted + 1 && samples <= longest_step && square.falls(error, -expm1(-rate))) {
+        counted = samples;
+      }
+      if (samples <= longest_step) continue;
+      const S needed = log(square.growth(error)) / rate;
+      auto& most = due[static_cast<std::size_t>(i)];
+      if (samples == first_step(i) || samples == longest_step + 1) most = 0;
+      if (!(needed < S(60000))) {
+        most = never;
+      } else if (needed > S(most)) {
+        most = static_cast<std::uint16_t>(needed + S(1));
+      }
+    }
   }
 };
 
@@ -201,14 +250,16 @@ struct PartDesign {
 /// V(e) = e' P^-1 e, which falls in each sample without a gap (gain/gap_certificate.hpp); R is the
 /// largest 2^-i for which V falls in the step over M samples, too. Gaps are bridged up to the
 /// longest for which there is such an R, so errors decay in any sequence of them. After longer gaps
-/// the observer restarts. Steps of 5 samples and more share a gain with those up to a fourth longer
-/// (that of M in the middle), and V is tested in each of them: 16 gains last for 101 samples.
+/// the last R serves, and corrections are due before the next one, see `recovery`. Steps of 5
+/// samples and more share a gain with those up to a fourth longer (that of M in the middle), and V
+/// is tested in each of them: 16 gains last for 101 samples.
 /// @tparam MostBridged longest step to be considered, samples
 template <int Size, Scalar S, class Placement, int MostBridged>
 class ModelGain {
  public:
   /// What the law can do besides `gain`.
-  static constexpr GainLawTraits traits{.kind = GainKind::preset, .bridges_gaps = true};
+  static constexpr GainLawTraits traits{
+      .kind = GainKind::preset, .bridges_gaps = true, .recovers = true};
   using Spec = typename Placement::template Spec<Size, LaneScalar<S>>;  ///< bandwidth or poles
   template <class T>
   using with_scalar = ModelGain<Size, T, Placement, MostBridged>;  ///< the same with another scalar
@@ -237,6 +288,8 @@ class ModelGain {
         law.gains_[gap] = detail::elements(part.whole * detail::column(design.gains[gap]));
       }
       law.longest_step_ = design.longest_step;
+      law.counted_ = design.counted;
+      law.due_ = design.due;
       return law;
     };
     const S& time = model.sample_time();
@@ -286,9 +339,21 @@ class ModelGain {
     return asked < longest_step_ ? asked : longest_step_ - 1;
   }
 
+  /// What a correction after `samples` means for the next gap beyond `longest_gap`, see
+  /// GainLawTraits.
+  [[nodiscard]] constexpr int recovery(unsigned samples) const noexcept {
+    constexpr int never = detail::GapRecovery<double>::never;
+    if (samples <= static_cast<unsigned>(counted_)) return -1;
+    if (samples <= static_cast<unsigned>(longest_step_)) return 0;
+    if (samples > static_cast<unsigned>(MostBridged)) return never;
+    const int due = due_[static_cast<std::size_t>(detail::gain_of_step(samples))];
+    return due < 65535 ? due : never;
+  }
+
  private:
   friend struct detail::LaneAccess;
-  static constexpr int data_members = 2;
+  static constexpr int data_members = 4;
+  static constexpr int gains_count = detail::gain_of_step(MostBridged) + 1;
 
   ModelGain() = default;
 
@@ -298,8 +363,10 @@ class ModelGain {
     return {part.step, part.output, part.degrees, poles};
   }
 
-  Array<ScaledGain<Size, S>, detail::gain_of_step(MostBridged) + 1> gains_{};
+  Array<ScaledGain<Size, S>, gains_count> gains_{};
   Lanes<int, S> longest_step_{1};
+  Lanes<int, S> counted_{1};
+  Lanes<Array<std::uint16_t, gains_count>, S> due_{};
 };
 
 /// Distinguishes the type in snapshots.

@@ -3,8 +3,9 @@
 /// gain/pole_set.hpp.
 ///
 /// A placement is a template argument of a linear observer. It defines what the config specifies
-/// (`Spec`), the check of it, the gains in both time domains, and the longest step (in samples)
-/// that a correction may bridge (`longest_step`; without it every gap restarts the observer).
+/// (`Spec`), the check of it, the gains in both time domains, and what is known of
+/// steps over several samples (`recovery`, see gain/bridged_steps.hpp; without it every gap
+/// restarts the observer).
 #pragma once
 
 #include <esokit/core/check.hpp>
@@ -46,10 +47,11 @@ struct EqualPoles : BandwidthPlacement {
     return EqualSampledPoles<Size, S>::from_bandwidth(bandwidth, sample_time);
   }
 
-  /// The longest step after which errors decay in any sequence of steps, in samples.
+  /// After which steps over several samples errors decay.
   template <int Size, Scalar S>
-  static constexpr int longest_step(const EqualSampledPoles<Size, S>& poles) noexcept {
-    return detail::longest_step<Size, detail::equal_steps>(S(S(1.0) - poles.contraction));
+  static constexpr auto recovery(const EqualSampledPoles<Size, S>& poles) noexcept {
+    return detail::recovery_of<Size, detail::equal_steps, detail::equal_recovery>(
+        S(S(1.0) - poles.contraction));
   }
 
   /// Gain of the continuous observer. @return l, N x 1, row i in 1/s^(i+1)

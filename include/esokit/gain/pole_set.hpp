@@ -168,10 +168,9 @@ struct PoleSet {
     return SampledPoleSet<Size, S>::from_continuous(poles, sample_time);
   }
 
-  /// The longest step after which errors decay in any sequence of steps, in samples; see
-  /// gain/gap_certificate.hpp.
+  /// After which steps over several samples errors decay; see gain/gap_certificate.hpp.
   template <int Size, PlainScalar S>
-  static int longest_step(const SampledPoleSet<Size, S>& poles) noexcept {
+  static detail::GapRecovery<S> recovery(const SampledPoleSet<Size, S>& poles) noexcept {
     using Fine = std::conditional_t<std::is_same_v<S, float>, double, S>;
     SampledPoleSet<Size, Fine> fine;
     for (std::size_t i = 0; i < Size; ++i) {
@@ -179,7 +178,8 @@ struct PoleSet {
                               static_cast<Fine>(poles.contractions[i].imag())};
     }
     const auto factors = pole_factors(fine);
-    return detail::longest_falling_step<Size, Fine>(fine, factors.unit, factors.decay);
+    const auto of = detail::recovery_by_square<Size, Fine>(fine, factors.unit, factors.decay);
+    return {of.longest_step, of.counted, static_cast<S>(of.per_octave), static_cast<S>(of.free)};
   }
 
   /// Gain of the continuous observer. @return l, N x 1, row i in 1/s^(i+1)

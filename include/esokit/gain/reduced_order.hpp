@@ -44,10 +44,11 @@ struct ReducedPoles : BandwidthPlacement {
     return {EqualSampledPoles<Size - 1, S>::from_bandwidth(bandwidth, sample_time)};
   }
 
-  /// The longest step after which errors decay in any sequence of steps, in samples.
+  /// After which steps over several samples errors decay.
   template <int Size, Scalar S>
-  static constexpr int longest_step(const ReducedSampledPoles<Size, S>& poles) noexcept {
-    return detail::longest_step<Size, detail::reduced_steps>(S(S(1.0) - poles.rest.contraction));
+  static constexpr auto recovery(const ReducedSampledPoles<Size, S>& poles) noexcept {
+    return detail::recovery_of<Size, detail::reduced_steps, detail::reduced_recovery>(
+        S(S(1.0) - poles.rest.contraction));
   }
 };
 

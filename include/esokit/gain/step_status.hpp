@@ -22,8 +22,9 @@ enum class StepStatus : std::uint16_t {
   prediction_dropped = 4,
   /// Samples were missing before this correction, which used the gain for the whole gap.
   gap_bridged = 8,
-  /// More samples than `max_gap` were missing, or the state could not be predicted: the observer
-  /// was restarted as by reset(y).
+  /// More samples than `longest_gap()` were missing, or more than `max_gap()` while corrections
+  /// were due after another long gap (`recovering()`), or the state could not be predicted: the
+  /// observer was restarted as by reset(y).
   restarted = 16,
   /// The state given to a reset was not finite, or its angle was too large to determine its turn:
   /// nothing was changed.

@@ -21,8 +21,8 @@ struct LinearEsoConfig {
   S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
   S sample_time{};         ///< T, s
   [[no_unique_address]] Settings model{};  ///< what is known of the plant
-  int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts; fewer
-                      ///< if errors would not decay in any sequence of gaps, see `max_gap()`
+  int max_gap = 100;  ///< missing samples after which the prediction still counts, 1 .. 65000;
+                      ///< after more a correction restarts; see `max_gap()`, `longest_gap()`
 };
 
 /// Settings of LinearEso by poles.

@@ -57,7 +57,7 @@ class NamedObserver : public Base {
       if (!model) return model.error();
       const auto laws = O::design(config, *model);
       if (!laws) return laws.error();
-      return Self(config, *model, *laws, detail::bridged_gap(Laws{*laws}, config.max_gap));
+      return Self(config, *model, *laws, config.max_gap);
     }
   }
 

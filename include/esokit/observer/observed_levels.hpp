@@ -87,8 +87,8 @@ class ObservedLevels {
   /// large to be predicted: then the next good y restarts the observer. The count ends at 65533.
   [[nodiscard]] constexpr Lanes<int, S> missed() const noexcept {
     Lanes<int, S> missed = gap_;
-    for (int i = 0; i < (Numbers::has_squares ? lane_count<S> : 0); ++i) {
-      if (detail::of_lane(gap_, i) == beyond_squares) detail::of_lane(missed, i) = 0;
+    for (int i = 0; i < lane_count<S>; ++i) {
+      if (detail::of_lane(gap_, i) == not_quick) detail::of_lane(missed, i) = 0;
     }
     return missed;
   }
@@ -123,7 +123,7 @@ class ObservedLevels {
   }
 
   /// The scaled gain with which the next `correct(y)` will weight the innovation e; after a gap,
-  /// the gain for the gap. For gaps above `max_gap` it does not apply, because `correct` restarts.
+  /// the gain for the gap. It does not apply where `correct` `restarts`.
   [[nodiscard]] ScaledGain<size, S> correction_gain(const S& e) const noexcept
       requires(Levels == 1) {
     return Numbers::law_gain(numbers_.laws[0], e, elapsed());
@@ -136,7 +136,14 @@ class ObservedLevels {
 
   /// True if so many samples are missing that the next `correct` restarts the observer.
   [[nodiscard]] constexpr Lanes<bool, S> restarts() const noexcept {
-    return missed() > max_gap_ + 1;
+    Lanes<bool, S> each{};
+    const Lanes<int, S> gaps = missed();
+    for (int i = 0; i < lane_count<S>; ++i) {
+      const int most = detail::of_lane(recovering_, i) > 0 ? detail::of_lane(max_gap_, i)
+                                                           : detail::of_lane(longest_gap_, i);
+      detail::of_lane(each, i) = detail::of_lane(gaps, i) > most + 1;
+    }
+    return each;
   }
 
   /// b0, as it was given.
@@ -149,9 +156,22 @@ class ObservedLevels {
     return numbers_.model.sample_time();
   }
 
-  /// Missing samples that a correction bridges before it restarts: the config's number, or fewer if
-  /// errors would not decay in every sequence of gaps up to it.
+  /// Missing samples that any correction bridges: the config's number, or fewer if errors would not
+  /// decay in every sequence of gaps up to it.
   [[nodiscard]] constexpr int max_gap() const noexcept { return max_gap_; }
+
+  /// Missing samples that a correction bridges if no other is due, see `recovering`; after more it
+  /// restarts. The config's number for a constant gain (LinearEso, HalfGainEso, ReducedOrderEso,
+  /// ModelEso, cascades): for the chain with any list of poles, or up to 7 states by a bandwidth;
+  /// for a model at most 100. Of other gains, in Guarded, and while a model follows a
+  /// speed, it is `max_gap()`.
+  [[nodiscard]] constexpr int longest_gap() const noexcept { return longest_gap_; }
+
+  /// Corrections that have to come before the next gap beyond `max_gap()` is bridged; while any are
+  /// due it restarts the observer, so that errors decay in any sequence of gaps. A correction
+  /// without a gap, or after a few samples, takes one away, one after a long gap adds some:
+  /// after 50 / omega_o about 6 / (omega_o T) for three states, 13 for four.
+  [[nodiscard]] constexpr Lanes<int, S> recovering() const noexcept { return recovering_; }
 
   /// What is known of the plant.
   [[nodiscard]] constexpr const Model& model() const noexcept { return numbers_.model; }
@@ -185,8 +205,10 @@ class ObservedLevels {
   friend struct detail::RecordAccess;
 
   /// At rest at zero.
-  ObservedLevels(const Laws& laws, const Model& model, std::uint16_t max_gap) noexcept
-      : numbers_{{}, laws, model}, max_gap_(max_gap) {
+  ObservedLevels(const Laws& laws, const Model& model, int max_gap) noexcept
+      : numbers_{{}, laws, model},
+        max_gap_(static_cast<std::uint16_t>(detail::bridged_gap(laws, max_gap))),
+        longest_gap_(static_cast<std::uint16_t>(detail::predicted_gap(laws, max_gap))) {
     for (State& state : numbers_.kept.states) state.fill(S(0.0));
     gap_ = up_to_date();
   }
@@ -200,7 +222,7 @@ class ObservedLevels {
   [[nodiscard]] ESOKIT_INLINE constexpr bool may_be_quick() const noexcept { return gap_ == 0; }
 
   /// All data members, for derived classes.
-  static constexpr int data_members = 3;
+  static constexpr int data_members = 5;
 
   /// @cond
   using Numbers = detail::LevelNumbers<Order, S, Extension, Law, Levels, Model>;
@@ -211,8 +233,9 @@ class ObservedLevels {
     return gap > 1 ? static_cast<unsigned>(gap) : 1u;
   }
 
-  /// In the place of a gap of 0 if 1/T is too large for it: `step` is not tried.
-  static constexpr std::uint16_t beyond_squares = 65534;
+  /// In the place of a gap of 0 if `step` is not to be tried: corrections are due, or 1/T is too
+  /// large for it.
+  static constexpr std::uint16_t not_quick = 65534;
 
   /// The gap after a correction.
   [[nodiscard]] constexpr Lanes<std::uint16_t, S> up_to_date() const noexcept {
@@ -222,17 +245,24 @@ class ObservedLevels {
       if (!all(sample_time() >= S(least))) [[unlikely]] {
         for (int i = 0; i < lane_count<S>; ++i) {
           if (!(detail::number_of_lane(sample_time(), i) >= least)) {
-            detail::of_lane(gap, i) = beyond_squares;
+            detail::of_lane(gap, i) = not_quick;
           }
         }
       }
     }
+    for (int i = 0; i < (recovers ? lane_count<S> : 0); ++i) {
+      if (detail::of_lane(recovering_, i) > 0) detail::of_lane(gap, i) = not_quick;
+    }
     return gap;
   }
+
+  static constexpr bool recovers = gain_law_traits<Law>.recovers;
 
   Numbers numbers_;
   Lanes<std::uint16_t, S> gap_{};
   Lanes<std::uint16_t, S> max_gap_;
+  Lanes<std::uint16_t, S> longest_gap_;
+  Lanes<std::uint16_t, S> recovering_{};
   /// @endcond
 };
 

@@ -20,8 +20,8 @@ template <Scalar S>
 struct ChainConfig {
   S input_gain{};     ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
   S sample_time{};    ///< T, s
-  int max_gap = 100;  ///< missing samples in a row that a correction may bridge, 1 .. 65000;
-                      ///< after more it restarts from the measurement; see `max_gap()`
+  int max_gap = 100;  ///< missing samples after which the prediction still counts, 1 .. 65000;
+                      ///< after more a correction restarts; see `max_gap()`, `longest_gap()`
 };
 
 namespace detail {
@@ -129,10 +129,10 @@ requires(detail::is_a_gain_law<Law, Order + Extension, S>() &&
       return StepStatus::ok;
     } else {
       const unsigned elapsed = this->elapsed();
-      const bool overdue = elapsed > max_gap_ + 1u;
+      const bool overdue = this->restarts();
       if (overdue || !corrected(y, elapsed)) [[unlikely]]
         return restart_from(y, overdue);
-      gap_ = up_to_date();
+      count_correction(elapsed);
       return elapsed > 1 ? StepStatus::gap_bridged : StepStatus::ok;
     }
   }
@@ -227,6 +227,8 @@ requires(detail::is_a_gain_law<Law, Order + Extension, S>() &&
       }
     }
     next.numbers_.kept = numbers_.kept;
+    // What is due was counted with other gains: it begins anew.
+    if (recovering_ > 0) next.recovering_ = next.most_due();
     next.gap_ = this->missed() == 0 ? next.up_to_date() : gap_;
     LevelStates states = numbers_.kept.states;
     const Model& model = fresh.model();
@@ -246,14 +248,13 @@ requires(detail::is_a_gain_law<Law, Order + Extension, S>() &&
   /// At rest at zero; `config` is already checked.
   PredictorCorrector(const ChainConfig<S>& config, const Laws& laws) noexcept requires
       std::same_as<Model, ChainModel<Order, S, Extension>>
-      : Base(laws, Model(config.input_gain, config.sample_time),
-             static_cast<std::uint16_t>(detail::bridged_gap(laws, config.max_gap))) {}
+      : Base(laws, Model(config.input_gain, config.sample_time), config.max_gap) {}
 
   /// The same with a model from its own `make`. @param laws one for each level, or one law for one
-  /// level
+  /// level @param max_gap as in the config
   template <class Given>
   PredictorCorrector(const Model& model, const Given& laws, int max_gap) noexcept
-      : Base(Laws{laws}, model, static_cast<std::uint16_t>(max_gap)) {}
+      : Base(Laws{laws}, model, max_gap) {}
 
   /// The rules for input_gain, sample_time and max_gap.
   static Check<S> check_chain(const ChainConfig<S>& config) {
@@ -288,7 +289,7 @@ requires(detail::is_a_gain_law<Law, Order + Extension, S>() &&
     return true;
   }
   ESOKIT_INLINE bool correct_all(const S& y) noexcept {
-    if (!(gap_ == 1 || gap_ == 0)) [[unlikely]]
+    if (!(gap_ == 1 || gap_ == 0) || (Base::recovers && !(recovering_ == 0))) [[unlikely]]
       return false;
     if (!numbers_.template correct<true>(y, 1u)) [[unlikely]]
       return false;
@@ -320,6 +321,7 @@ requires(detail::is_a_gain_law<Law, Order + Extension, S>() &&
   using Base::gap_;
   using Base::max_gap_;
   using Base::numbers_;
+  using Base::recovering_;
   using Base::up_to_date;
 
   /// A gap longer than any max_gap.
@@ -332,6 +334,29 @@ requires(detail::is_a_gain_law<Law, Order + Extension, S>() &&
   /// False, and nothing has changed, if the result is not finite. @param elapsed 1: no gap
   constexpr bool corrected(S y, unsigned elapsed) noexcept {
     return numbers_.template correct<false>(y, elapsed);
+  }
+  /// After a correction. @param elapsed 1: no gap
+  constexpr void count_correction(unsigned elapsed) noexcept {
+    if constexpr (Base::recovers) {
+      if (elapsed > 1 || recovering_ > 0) [[unlikely]]
+        count_recovery(elapsed);
+    }
+    gap_ = up_to_date();
+  }
+  ESOKIT_COLD void count_recovery(unsigned elapsed) noexcept {
+    constexpr std::uint16_t beyond = 65535;  // more than can be counted: until a restart
+    if (recovering_ == beyond) return;
+    const int due =
+        recovering_ + (elapsed > 1 ? detail::recovery_after(numbers_.laws, elapsed) : -1);
+    recovering_ = due < 0        ? std::uint16_t{0}
+                  : due < beyond ? static_cast<std::uint16_t>(due)
+                                 : beyond;
+  }
+  /// What is due after the longest gap that is bridged.
+  [[nodiscard]] std::uint16_t most_due() const noexcept {
+    const auto samples = static_cast<unsigned>(this->longest_gap()) + 1u;
+    const int due = detail::recovery_after(numbers_.laws, samples);
+    return due > 0 && due < 65535 ? static_cast<std::uint16_t>(due) : std::uint16_t{0};
   }
   /// After a gap that is not bridged, or if y cannot correct the state.
   ESOKIT_COLD StepStatus restart_from(S y, bool overdue) noexcept {
@@ -354,6 +379,7 @@ requires(detail::is_a_gain_law<Law, Order + Extension, S>() &&
       numbers_.kept.states = next;
       if (corrected(y, 1u)) {
         numbers_.kept.applied_input = u_applied;
+        count_correction(1u);
         return StepStatus::ok;
       }
       numbers_.kept.states = before;
@@ -380,8 +406,8 @@ requires(detail::is_a_gain_law<Law, Order + Extension, S>() &&
   constexpr void count_missed() noexcept {
     for (int i = 0; i < lane_count<S>; ++i) {
       std::uint16_t& gap = detail::of_lane(gap_, i);
-      if (Numbers::has_squares && gap == Base::beyond_squares) gap = 0;
-      gap = gap < Base::beyond_squares - 1 ? static_cast<std::uint16_t>(gap + 1) : restart_due;
+      if (gap == Base::not_quick) gap = 0;
+      gap = gap < Base::not_quick - 1 ? static_cast<std::uint16_t>(gap + 1) : restart_due;
     }
   }
 
@@ -412,6 +438,7 @@ requires(detail::is_a_gain_law<Law, Order + Extension, S>() &&
     }
     if (!take_seldom(states)) return StepStatus::state_rejected;
     numbers_.kept.innovation = S(0.0);
+    recovering_ = {};
     gap_ = up_to_date();
     detail::unroll<(gain_law_traits<Law>.resets ? Levels : 0)>(
         [&](auto i) { numbers_.laws[i].reset(); });

@@ -44,8 +44,9 @@ CCode c_code(const RecordedDesign& design);
 /// Compiled without contraction (-std=c99 in GCC) it equals the C++ bit for bit, as far as tested:
 /// after any bad sample, gap, report or start. Where the design computes a power or an exponential
 /// at each sample (NonlinearEso), nothing is promised through those of another library. A gap of
-/// each length has its gains in a table of max_gap + 1 rows: choose `max_gap` as short as the
-/// machine allows.
+/// each length has its gains in a table of one row more than the `max_gap` of the config: choose it
+/// as short as the machine allows. Where gaps beyond `max_gap()` are bridged, `update` of a good
+/// sample also reads whether corrections are due.
 ///
 /// Written are LinearEso, also with a set of poles, HalfGainEso, ReducedOrderEso, CascadeEso,
 /// AdjustableBandwidthEso, NonlinearEso, ModelEso, PlantEso and their cascades (not with

@@ -94,6 +94,7 @@ class CDesign {
   void set_words();
 
   [[nodiscard]] std::string gain_rows() const;
+  [[nodiscard]] std::string recovery() const;
   [[nodiscard]] std::string settings(const std::string& mark) const;
 
   static std::string at(const char* name, int i) {

@@ -71,7 +71,7 @@ Expected<FixedCode, Error<double>> fixed_code(const RecordedDesign& recorded,
 /// their declared ranges; a y outside is no measurement. What a shift leaves over is kept where the
 /// bound needs it, so that a slow observer at a high rate does not stall. Where samples are missing
 /// the states move in 64 bits and are held within their ranges, with a flag; after more than
-/// `max_gap` samples the next good one restarts.
+/// `max_gap()` samples the next good one restarts, also where the object bridges longer gaps.
 ///
 /// The bounds are worst cases over all sequences of y and u within their ranges with a measurement
 /// at each sample: sums of the impulse responses from each rounding that is written to each

@@ -341,7 +341,12 @@ class DesignRecorder {
   }
 
   [[nodiscard]] Check<V> take_table(const Core& observer) {
-    for (int elapsed = 1; elapsed <= observer.max_gap() + 1; ++elapsed) {
+    const auto& laws = RecordAccess::laws(observer);
+    constexpr auto most = static_cast<unsigned>(most_bridged);
+    design.recovers = observer.longest_gap() > observer.max_gap() ||
+                      (design.options.settings_in_struct && recovery_after(laws, most) >= 0 &&
+                       recovery_after(laws, most) < GapRecovery<double>::never);
+    for (int elapsed = 1; elapsed <= observer.longest_gap() + 1; ++elapsed) {
       std::vector<double> row;
       for (const auto& law : RecordAccess::laws(observer)) {
         const auto gap = static_cast<unsigned>(elapsed);
@@ -358,6 +363,10 @@ class DesignRecorder {
         }
       }
       design.gap_gains.push_back(row);
+      const int due = elapsed == 1 ? -1 : recovery_after(laws, static_cast<unsigned>(elapsed));
+      design.recovery.push_back(due < GapRecovery<double>::never
+                                    ? static_cast<std::uint16_t>(due + 1)
+                                    : std::uint16_t{0});
     }
     return {};
   }

@@ -187,7 +187,9 @@ struct RecordedDesign {
   MeasuredNumbers measured{};
   KnownNumbers known{};
   MapNumbers map{};
-  int max_gap = 0;  ///< missing samples that are bridged
+  int max_gap = 0;                        ///< missing samples that are bridged by each correction
+  std::vector<std::uint16_t> recovery{};  ///< of a row of gap_gains: 1 + what is due after it
+  bool recovers = false;                  ///< whether with some setting something may be due
   LoopRules loop{};
   double lower = 0;
   double upper = 0;

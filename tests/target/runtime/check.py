@@ -26,7 +26,8 @@ OF_LOOPS = ["DIVIDED", "STAYS_SAFE", "HOLDS_SAFE", "SOFTENS", "MONITORED"]
 GUARDS = [set(), {"GUARDED"}, {"GUARDED", "BOUNDED"}, {"GUARDED", "LEAKS"}, {"GUARDED", "BOUND_OF_U"},
           {"GUARDED", "BOUNDED", "BOUND_OF_U", "LEAKS"}]
 W = [set(), {"MEASURED", "ONE_W"}, {"MEASURED"}]
-FLAGS = OF_LOOPS + ["HOLDS_AT_START", "SETTINGS", "DELAYED", "GATED", "WRAPPED", "KNOWN", "MAPPED", "SINGLE"]
+FLAGS = OF_LOOPS + ["HOLDS_AT_START", "SETTINGS", "DELAYED", "GATED", "WRAPPED", "KNOWN", "MAPPED", "SINGLE",
+                    "RECOVERS"]
 DEVIATIONS = ("2.5", "15.5", "21.15")
 ALL = sorted({*FLAGS, "GATED_ANGLE", "LAW_OF_ANGLE"}.union(*KINDS, *LAWS, *GUARDS, *W))
 
@@ -43,6 +44,7 @@ def valid(has):
                                             "MAPPED", "SETTINGS"} or ("TABLE" in has and not kept)))
         or ("GUARDED" in has and (not kept or "MEASURED" in has))
         or ("SETTINGS" in has and (not kept or "SOFTENS" in has))
+        or ("RECOVERS" in has and "TABLE" not in has)
         or ("SOFTENS" in has and "COMPENSATOR" in has)
         or {"MAPPED", "SOFTENS"} <= has
         or ("KNOWN" in has and "SCHEDULE" in has)

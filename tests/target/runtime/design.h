@@ -31,8 +31,16 @@ typedef double real;
 #define DESIGN_INIT o->z1 = number(0.0);
 #define DESIGN_VECTORS {number(0.0), number(0.0), number(0.0)}
 #define DESIGN_GAINS {number(0.5), number(0.25), number(0.125)}
+#if ESOKIT_RECOVERS
+#define DESIGN_RECOVERED , {DESIGN_RECOVERY}, 1u
+#else
+#define DESIGN_RECOVERED
+#endif
 #define DESIGN_SET_OF_SETTINGS \
-  const esokit_settings esokit_design = {DESIGN_MARK, number(1.0), {DESIGN_GAINS}};
+  const esokit_settings esokit_design = {DESIGN_MARK, number(1.0), {DESIGN_GAINS} DESIGN_RECOVERED};
+#define DESIGN_RECOVERY 0u
+#define MAX_BRIDGED 1u
+#define LAST_ROW 0u
 #define esokit_DESIGN_SET esokit_design
 #define DESIGN_MARK 1u
 #define DESIGN_Y z1

@@ -25,6 +25,10 @@ ESOKIT_FUNCTION CCode c_code(const RecordedDesign& design) {
   RecordedDesign rest = design;
   for (double& number : rest.numbers) number = 0;
   for (auto& row : rest.gap_gains) std::fill(row.begin(), row.end(), 0.0);
+  if (rest.recovers) {  // what is due, and from which gap on, are settings, too
+    std::fill(rest.recovery.begin(), rest.recovery.end(), std::uint16_t{0});
+    rest.max_gap = 0;
+  }
   rest.samples.clear();
   rest.options.comment = {};
   rest.options.settings_name = {};

@@ -117,6 +117,7 @@ ESOKIT_FUNCTION void CDesign::set_features() {
   text_.feature("ESOKIT_MONITORED", d.options.watched);
   text_.feature("ESOKIT_SETTINGS", d.options.settings_in_struct);
   text_.feature("ESOKIT_TABLE", gains_stand);
+  text_.feature("ESOKIT_RECOVERS", d.recovers);
   text_.feature("ESOKIT_GAIN_IS_KEPT", gains_stand && d.gain_is_kept);
   text_.feature("ESOKIT_SCHEDULE", d.law.kind == RunningLaw::schedule);
   text_.feature("ESOKIT_FILTER", d.law.kind == RunningLaw::filter);
@@ -146,7 +147,11 @@ ESOKIT_FUNCTION void CDesign::set_constants() {
   number("SAMPLE_TIME", d.sample_time);
   number("LARGEST", d.single ? static_cast<double>((std::numeric_limits<float>::max)())
                              : (std::numeric_limits<double>::max)());
-  text_.count("ROWS", static_cast<std::size_t>(d.max_gap) + 1);
+  const auto bridged = static_cast<std::size_t>(d.max_gap) + 1;
+  const std::size_t rows = d.recovery.empty() ? bridged : d.recovery.size();
+  text_.count("ROWS", rows);
+  text_.count("LAST_ROW", rows - 1);
+  text_.count("MAX_BRIDGED", bridged);
   text_.count("STATES", static_cast<std::size_t>(d.size));
   text_.count("ORDER", static_cast<std::size_t>(d.order));
   text_.constant("SAMPLES", std::to_string(d.samples.size()));
@@ -279,6 +284,7 @@ ESOKIT_FUNCTION void CDesign::set_rows() {
       design_.options.settings_in_struct ? "o->settings->gains[row][" : "gains[row][";
   text_.replace("DESIGN_K", listed(gains, [&](int i) { return row + std::to_string(i) + "]"; }));
   text_.lines("DESIGN_GAINS", gain_rows());
+  text_.lines("DESIGN_RECOVERY", "    " + recovery() + "\n");
 }
 
 ESOKIT_FUNCTION void CDesign::set_state() {
@@ -432,6 +438,11 @@ ESOKIT_FUNCTION std::string CDesign::gain_rows() const {
   return rows;
 }
 
+ESOKIT_FUNCTION std::string CDesign::recovery() const {
+  return listed(static_cast<int>(design_.recovery.size()), [&](int i) {
+    return std::to_string(design_.recovery[static_cast<std::size_t>(i)]) + "u";
+  });
+}
 ESOKIT_FUNCTION std::string CDesign::settings(const std::string& mark) const {
   const CodeOptions& options = design_.options;
   std::string set = "const " + options.name + "_settings " + options.name + "_" +
@@ -441,7 +452,11 @@ ESOKIT_FUNCTION std::string CDesign::settings(const std::string& mark) const {
       set += ",\n  " + writer_.number(design_.numbers[i]);
     }
   }
-  return set + ",\n  {\n" + gain_rows() + "  }\n};\n\n";
+  set += ",\n  {\n" + gain_rows() + "  }";
+  if (design_.recovers) {
+    set += ",\n  {" + recovery() + "},\n  " + std::to_string(design_.max_gap + 1) + "u";
+  }
+  return set + "\n};\n\n";
 }
 
 template <class One>

@@ -60,7 +60,8 @@ ESOKIT_FUNCTION std::int64_t FixedRecord::start_held() const {
 }
 
 ESOKIT_FUNCTION int FixedRecord::table_rows() const {
-  int rows = (std::max)(1, static_cast<int>(design_->gap_gains.size()));
+  // Longer gaps restart: their bounds would be those of a state that ran away.
+  int rows = design_->gap_gains.empty() ? 1 : design_->max_gap + 1;
   if (wraps_) {
     const int half = (1 << (options_.y.counter_bits - 1)) - 1;
     rows = (std::min)(rows, half / options_.y.most);

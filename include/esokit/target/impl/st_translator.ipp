@@ -235,8 +235,8 @@ ESOKIT_FUNCTION void StTranslator::take_settings(const Variable& set,
     const int columns = field.sizes.empty() ? 1 : field.sizes.back();
     const int rows = field.sizes.size() > 1 ? field.sizes[0] : 1;
     for (int i = 0; i < rows * columns && next < numbers.size(); ++i) {
-      const std::string place =
-          "[" + std::to_string(i / columns) + ", " + std::to_string(i % columns) + "]";
+      const std::string row = field.sizes.size() > 1 ? std::to_string(i / columns) + ", " : "";
+      const std::string place = "[" + row + std::to_string(i % columns) + "]";
       settings_ += "  settings." + field.name + (field.sizes.empty() ? "" : place) +
                    " := " + numbers[next++] + ";\n";
     }

@@ -169,7 +169,7 @@ void esokit_init(esokit_state *o)
 #if ESOKIT_HOLDS_AT_START
   o->hold_left = HOLD_SAMPLES;
 #endif
-  o->gap = 0u;
+  up_to_date(o);
   o->mode = FIRST_MODE;
   o->elsewhere = FIRST_ELSEWHERE;
   o->status = 0u;
@@ -221,7 +221,7 @@ unsigned esokit_start(esokit_state *o, real y, real u)
 #if ESOKIT_GATED
   gate_set(o, true);
 #endif
-  o->gap = 0u;
+  up_to_date(o);
   o->mode = ESOKIT_RUNNING;
   o->elsewhere = 1u;
   return 0u;
@@ -382,6 +382,7 @@ bool esokit_adopt(esokit_state *o, const esokit_settings *settings)
     const real held = o->u_last;
     const real u = commanded(o);
     o->settings = settings;
+    recover_anew(o);
     take_command(o, u);
     o->u_last = held;
   }
@@ -393,7 +394,7 @@ bool esokit_adopt(esokit_state *o, const esokit_settings *settings)
 void esokit_init(esokit_state *o)
 {
   DESIGN_INIT
-  o->gap = 0u;
+  up_to_date(o);
 }
 
 unsigned esokit_reset(esokit_state *o, real y)
@@ -429,6 +430,7 @@ bool esokit_adopt(esokit_state *o, const esokit_settings *settings)
   const bool is_ours = settings->design == DESIGN_MARK;
   if (is_ours) {
     o->settings = settings;
+    recover_anew(o);
   }
   return is_ours;
 }

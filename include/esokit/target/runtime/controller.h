@@ -43,6 +43,10 @@ typedef struct {
   uint32_t design; /* of which text: others are refused */
   DESIGN_SETTINGS
   real gains[ROWS][GAINS]; /* of the observer, after 1, 2, .. samples */
+#if ESOKIT_RECOVERS
+  uint16_t recovery[ROWS]; /* 0: counts; else 1 more than are due after it */
+  uint16_t bridged; /* samples after which each correction is possible */
+#endif
 } esokit_settings;
 
 extern const esokit_settings esokit_DESIGN_SET;
@@ -144,6 +148,9 @@ typedef struct {
 #endif
 #if ESOKIT_HOLDS_AT_START || ESOKIT_PREDICTIVE
   uint32_t hold_left; /* samples of the start hold */
+#endif
+#if ESOKIT_RECOVERS
+  uint16_t due; /* corrections before the next long gap */
 #endif
   uint16_t gap; /* samples since the last measurement that was taken */
 #if ESOKIT_CONTROLLER || ESOKIT_PREDICTIVE

@@ -42,7 +42,11 @@ static unsigned update_core(esokit_state *o, real y, real u)
 #if ESOKIT_SCHEDULE || ESOKIT_FILTER
   law_advance(o);
 #endif
+#if ESOKIT_RECOVERS
+  if ((o->gap == 0u) && (o->due == 0u) && observe(o, y, u)) {
+#else
   if ((o->gap == 0u) && observe(o, y, u)) {
+#endif
 #if ESOKIT_SCHEDULE || ESOKIT_FILTER
     law_accept(o);
 #endif

@@ -5,8 +5,12 @@ R"esokit("
 
 #if ESOKIT_SETTINGS
 #define gains_of o->settings->gains
+#define recovery_of o->settings->recovery
+#define BRIDGED o->settings->bridged
 #else
 #define gains_of gains
+#define recovery_of recovery
+#define BRIDGED MAX_BRIDGED
 #endif
 static bool correct_after(esokit_state *o, real y, unsigned elapsed)
 {

@@ -131,7 +131,7 @@ static unsigned correct_standing(esokit_state *o, real y)
 {
   real before[LEVELS];
   const unsigned elapsed = (o->gap > 1u) ? o->gap : 1u;
-  const real left = (elapsed > ROWS) ? 1.0 : (1.0 - gains_of[elapsed - 1u][0]);
+  const real left = is_overdue(o) ? 1.0 : (1.0 - gains_of[elapsed - 1u][0]);
   unsigned status;
   get_disturbance(o, before);
   status = correct_outside(o, y);

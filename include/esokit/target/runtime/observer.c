@@ -11,11 +11,61 @@ static uint16_t next_place(uint16_t place, uint16_t last)
 }
 
 #endif
+static void up_to_date(esokit_state *o)
+{
+  o->gap = 0u;
+#if ESOKIT_RECOVERS
+  o->due = 0u;
+#endif
+}
+
+/* The next y restarts. */
+static bool is_overdue(const esokit_state *o)
+{
+#if ESOKIT_RECOVERS
+  return (o->gap > ROWS) || ((o->due != 0u) && (o->gap > BRIDGED));
+#else
+  return o->gap > ROWS;
+#endif
+}
+
+#if ESOKIT_RECOVERS
+/* What a correction means for the next gap of more than BRIDGED samples. */
+static void recover(esokit_state *o, unsigned elapsed)
+{
+#if !ESOKIT_SETTINGS
+  static const uint16_t recovery[ROWS] = { /* 0: counts; else 1 more than are due after it */
+    DESIGN_RECOVERY
+  };
+#endif
+  const uint32_t more = recovery_of[elapsed - 1u];
+  const uint32_t due = (uint32_t)o->due + more;
+  if ((o->due < 65535u) && (due > 0u)) { /* else it is more than can be counted: until a restart */
+    o->due = (due < 65536u) ? (uint16_t)(due - 1u) : 65535u;
+  }
+}
+
+#endif
+#if ESOKIT_SETTINGS
+/* With other gains: what was due was counted with the old ones. */
+static void recover_anew(esokit_state *o)
+{
+#if ESOKIT_RECOVERS
+  const uint16_t most = recovery_of[LAST_ROW];
+  if (o->due != 0u) {
+    o->due = (most > 0u) ? (uint16_t)(most - 1u) : 0u;
+  }
+#else
+  (void)o;
+#endif
+}
+
+#endif
 static bool restart_plain(esokit_state *o, real y)
 {
   const bool good = is_finite(y) && restart_at(o, y);
   if (good) {
-    o->gap = 0u;
+    up_to_date(o);
 #if ESOKIT_SCHEDULE || ESOKIT_FILTER
     law_begin(o);
 #endif
@@ -50,12 +100,15 @@ static unsigned correct_plain(esokit_state *o, real y)
 {
   unsigned status = ESOKIT_MEASUREMENT_REJECTED;
   const unsigned elapsed = (o->gap > 1u) ? o->gap : 1u;
-  if (elapsed > ROWS) {
+  if (is_overdue(o)) {
     if (restart_plain(o, y)) {
       status = ESOKIT_RESTARTED;
     }
   } else if (correct_after(o, y, elapsed)) {
     o->gap = 0u;
+#if ESOKIT_RECOVERS
+    recover(o, elapsed);
+#endif
 #if ESOKIT_SCHEDULE || ESOKIT_FILTER
     law_accept(o);
 #endif
@@ -90,7 +143,7 @@ static bool gate_lets_in(esokit_state *o, real y)
   if (!is_finite(innovation)) {
     return true;
   }
-  if (o->gap > ROWS) {
+  if (is_overdue(o)) {
     gate_set(o, true);
     return true;
   }
@@ -120,7 +173,7 @@ static bool gate_lets_in(esokit_state *o, real y)
 static bool gate_lets_in(const esokit_state *o, real y)
 {
   const real innovation = y - o->DESIGN_Y;
-  return (o->gap > ROWS) || !is_finite(innovation) || is_inlier(o, y);
+  return is_overdue(o) || !is_finite(innovation) || is_inlier(o, y);
 }
 
 #endif

@@ -41,7 +41,7 @@ static void arm(esokit_state *o)
     return;
   }
 #endif
-  if (o->gap > ROWS) {
+  if (is_overdue(o)) {
     good = arm_restart(o);
   } else {
     good = arm_after(o, o->gap);
@@ -79,7 +79,7 @@ void esokit_init(esokit_state *o)
   o->measurement = 0.0;
   o->u_held = 0.0;
   o->hold_left = HOLD_SAMPLES;
-  o->gap = 0u;
+  up_to_date(o);
   o->mode = FIRST_MODE;
   o->phase = FIRST_PHASE;
   o->status = 0u;
@@ -93,7 +93,7 @@ unsigned esokit_start(esokit_state *o, real y, real u)
     *o = before;
     return ESOKIT_STATE_REJECTED;
   }
-  o->gap = 0u;
+  up_to_date(o);
   o->hold_left = 0u;
   o->mode = ESOKIT_RUNNING;
   (void)take_output(o, u);

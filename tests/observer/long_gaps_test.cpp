@@ -1,0 +1,202 @@
+// An adversary against the count of what is due after a long gap: it plays gaps beyond max_gap() as
+// near together as `recovery` of the gain law allows, and looks for errors that grow. It must find
+// none, and must find some if only half of what is due has to come. ESOKIT_ADVERSARY_SETTINGS=10000
+// before the program runs so many settings of each type, ESOKIT_ADVERSARY_SEED other ones.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <esokit/eigen.hpp>
+#include <esokit/gain/pole_set.hpp>
+#include <esokit/math/combinatorics.hpp>
+#include <esokit/observer/half_gain_eso.hpp>
+#include <esokit/observer/linear_eso.hpp>
+#include <esokit/observer/reduced_order_eso.hpp>
+#include <map>
+#include <support/numbers.hpp>
+#include <vector>
+
+namespace observer_long_gaps_test {
+
+using namespace esokit;
+using esokit_test::Random;
+
+std::uint64_t asked(const char* variable, std::uint64_t otherwise) {
+  const char* text = std::getenv(variable);
+  return text != nullptr ? std::strtoull(text, nullptr, 10) : otherwise;
+}
+
+/// The errors of a chain with a gain law, and how much of what is due the adversary has to wait.
+template <class Observer>
+class Adversary {
+ public:
+  static constexpr int n = Observer::size;
+  using Square = EigenMatrix<double, n, n>;
+  using Column = EigenMatrix<double, n, 1>;
+
+  /// @param unit omega_o T: states are counted in 1 / omega_o^r
+  Adversary(const Observer& observer, double share, double unit, Random& random)
+      : law_(observer.gain_law()),
+        bridged_(observer.max_gap() + 1),
+        share_(share),
+        unit_(unit),
+        random_(random) {
+    const int longest = observer.longest_gap() + 1;
+    for (double m = bridged_ + 1; m < longest; m *= 1.6) long_.push_back(static_cast<int>(m));
+    long_.push_back(longest);
+    for (double m = 1; m < bridged_; m = m * 1.7 + 1) short_.push_back(static_cast<int>(m));
+    short_.push_back(bridged_);
+  }
+
+  /// Logarithm of what the worst that it finds makes of the error, in each repetition.
+  double worst() { return std::max({pairs(), sequence(false), sequence(true)}); }
+
+ private:
+  const Square& after(int samples) {
+    const auto [place, is_new] = steps_.try_emplace(samples);
+    if (is_new) {
+      const auto gain =
+          samples == 1 ? law_.gain(0.0) : law_.gap_gain(0.0, static_cast<unsigned>(samples));
+      for (int i = 0; i < n; ++i) {
+        for (int j = 0; j < n; ++j) {
+          const double moved = j < i ? 0 : binomial(j, i) * std::pow(samples, j - i);
+          place->second(i, j) = (moved - gain[static_cast<std::size_t>(i)] * std::pow(samples, j)) *
+                                std::pow(unit_, i - j);
+        }
+      }
+    }
+    return place->second;
+  }
+  [[nodiscard]] int due(int samples) const {
+    const int whole = law_.recovery(static_cast<unsigned>(samples));
+    return whole < 0 ? -1 : static_cast<int>(std::ceil(share_ * whole));
+  }
+
+  static double growth(Square pattern) {
+    double sum = 0;
+    for (int squarings = 0; squarings < 30; ++squarings) {
+      const double size = pattern.norm();
+      if (!(size > 0)) return -1e9;
+      sum += std::ldexp(std::log(size), -squarings);
+      pattern /= size;
+      pattern = pattern * pattern;
+    }
+    return sum;
+  }
+  Square recovered(int samples) {
+    Square all = after(samples), one = after(1);
+    for (int rest = std::max(0, due(samples)); rest > 0; rest /= 2) {
+      if (rest % 2 != 0) all = one * all;
+      one = one * one;
+    }
+    return all;
+  }
+  double pairs() {
+    double most = -1e9;
+    for (const int a : long_) {
+      for (const int b : long_) most = std::max(most, growth(recovered(a) * recovered(b)));
+    }
+    return most;
+  }
+
+  /// Random gaps, or at each step the one that leaves the largest error.
+  double sequence(bool greedy) {
+    Column e = Column::Random();
+    double sum = 0, since = 0;
+    int count = 0, gaps = 0;
+    for (int k = 0; gaps < 120; ++k) {
+      if (k > 20000) return -1e9;  // so few may be long that the others rule
+      int pick = 1;
+      if (!greedy) {
+        const auto& from = count == 0 ? long_ : short_;
+        if (count == 0 || random_.index(10) == 0)
+          pick = from[static_cast<std::size_t>(random_.index(static_cast<int>(from.size())))];
+      } else {
+        double most = -1;
+        const auto look = [&](int samples) {
+          const double size = (after(samples) * e).norm();
+          if (size > most) {
+            most = size;
+            pick = samples;
+          }
+        };
+        look(1);
+        for (const int samples : short_) {
+          if (random_.index(3) == 0) look(samples);
+        }
+        for (const int samples : long_) {
+          if (count == 0) look(samples);
+        }
+      }
+      e = after(pick) * e;
+      const double size = e.norm();
+      if (!(size > 1e-300)) return -1e9;
+      sum += std::log(size);
+      e /= size;
+      count = std::max(0, count + due(pick));
+      if (pick > bridged_ && ++gaps == 20) since = sum;
+    }
+    return (sum - since) / 100;
+  }
+
+  std::remove_cvref_t<decltype(std::declval<Observer>().gain_law())> law_;
+  int bridged_;
+  double share_, unit_;
+  Random& random_;
+  std::vector<int> long_{}, short_{};
+  std::map<int, Square> steps_{};
+};
+
+/// How many of the settings grow. @param share of what is due
+template <class Observer>
+int growing(double share) {
+  Random random(1 + asked("ESOKIT_ADVERSARY_SEED", 0));
+  const auto settings = asked("ESOKIT_ADVERSARY_SETTINGS", 40);
+  int found = 0;
+  for (std::uint64_t done = 0; done < settings;) {
+    const double unit = std::exp(random.uniform(std::log(0.02), std::log(3.0)));
+    typename Observer::Config config{};
+    if constexpr (requires { config.poles; }) {
+      const double apart = random.uniform(0, 1.5);
+      for (std::size_t i = 0; i < config.poles.size(); ++i) {
+        config.poles[i] = -unit * std::exp(apart * static_cast<double>(i) / Observer::size);
+      }
+      if (random.index(2) == 0) {
+        config.poles[0] = {-unit, random.uniform(0, 1) * unit};
+        config.poles[1] = std::conj(config.poles[0]);
+      }
+    } else {
+      config.observer_bandwidth = unit;
+    }
+    config.input_gain = config.sample_time = 1;
+    config.max_gap = static_cast<int>(std::exp(random.uniform(std::log(5), std::log(3000))));
+    const auto observer = Observer::make(config);
+    if (!observer || observer->longest_gap() <= observer->max_gap()) continue;
+    ++done;
+    found += Adversary<Observer>(*observer, share, unit, random).worst() > 0;
+  }
+  return found;
+}
+
+template <class Observer>
+void plays() {
+  SCOPED_TRACE(testing::internal::GetTypeName<Observer>());
+  EXPECT_EQ(growing<Observer>(1), 0);
+  EXPECT_GT(growing<Observer>(0.5), 0);
+}
+
+TEST(LongGaps, NoSequenceGrowsIfWhatIsDueHasCome) {
+  plays<LinearEso<2>>();
+  plays<LinearEso<3>>();
+  plays<LinearEso<4>>();
+  plays<HalfGainEso<2>>();
+  plays<HalfGainEso<3>>();
+  plays<ReducedOrderEso<2>>();
+  plays<ReducedOrderEso<3>>();
+  plays<LinearEso<2, double, 1, PoleSet>>();
+  plays<LinearEso<3, double, 1, PoleSet>>();
+}
+
+}  // namespace observer_long_gaps_test
