@@ -523,7 +523,8 @@ Seen compare(const C& fresh, InC<typename C::scalar_type>& in_c, double input_ga
       const V under = random.index(4) == 0 ? anything<V>(random) : static_cast<V>(u);
       EXPECT_EQ(static_cast<unsigned>(controller.start(at, under)), in_c.start(at, under)) << k;
       if (random.index(2) == 0) {
-        EXPECT_EQ(static_cast<unsigned>(controller.applied(under)), in_c.applied(under)) << k;
+        const V moved = random.index(4) == 0 ? under : static_cast<V>(random.uniform(-3, 3));
+        EXPECT_EQ(static_cast<unsigned>(controller.applied(moved)), in_c.applied(moved)) << k;
       }
       const V mine = controller.update(y, given);
       EXPECT_TRUE(equal_bits(mine, in_c.update(y, given))) << "sample " << k << ", started";
