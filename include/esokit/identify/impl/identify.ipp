@@ -494,11 +494,9 @@ inline const OrderFit& chosen_fit(const Identified& found) {
                        [&](const OrderFit& order) { return order.model.order == found.order; });
 }
 
-/// Whether rows with u `rows` earlier are far more likely at all: by the same model from several
+/// Whether rows with an earlier u are far more likely at all: by the same model from several
 /// starts.
-inline bool worth_earlier(const Folded& found, const FitData& raw, const FitData& earlier,
-                          int rows) {
-  (void)rows;
+inline bool worth_earlier(const Folded& found, const FitData& raw, const FitData& earlier) {
   const OrderFit& chosen = chosen_fit(found.first);
   const auto least = [&](const FitData& data) {
     InnovationsFit fit(data, chosen.model, chosen.bounds);
@@ -592,10 +590,11 @@ ESOKIT_FUNCTION Expected<Identified, Error<double>> study(const Log& log,
   auto found = studied(prepared->data, 0.1, 0.5);
   if (!found)
     return E{"averaged", static_cast<double>(options.averaged), "leaves fewer than 200 rows"};
-  if (options.late_input) {
+  // Of a u that follows from y of its row alone, an earlier one tells that law and no machine.
+  if (options.late_input && detail::own_input(raw) > detail::own_input_min) {
     for (int rows = 1; rows <= 2; ++rows) {
       const FitData earlier = detail::advanced(prepared->data, static_cast<std::size_t>(rows));
-      if (!detail::worth_earlier(*found, raw, excerpt(earlier, options.rows_max), rows)) break;
+      if (!detail::worth_earlier(*found, raw, excerpt(earlier, options.rows_max))) break;
       result.late_rows = rows;
       auto again = studied(earlier, 0.6, 0.3);
       if (!again || !detail::far_more_likely(*again, *found)) break;
