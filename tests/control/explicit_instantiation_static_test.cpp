@@ -11,11 +11,11 @@
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
+#include <esokit/control/approach_profile.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/control/nonlinear_feedback.hpp>
 #include <esokit/control/predictive_adrc.hpp>
-#include <esokit/control/approach_profile.hpp>
 #include <esokit/control/smooth_profile.hpp>
 #include <esokit/control/tracking_differentiator.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>

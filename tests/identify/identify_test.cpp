@@ -292,7 +292,8 @@ TEST(Averaging, MustHelpAgreeAndBeShort) {
   best.correlation = 0.15;
   averaged.correlation = 0.1;
   EXPECT_TRUE(better());
-  // A latency at the end of its range in rows: then b0 need not agree, if rows stay short beside it.
+  // A latency at the end of its range in rows: then b0 need not agree, if rows stay short beside
+  // it.
   best.at_bound = true;
   averaged.input_gain.value = 5;
   averaged.latency.value = 12.1 * T;
