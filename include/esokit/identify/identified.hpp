@@ -143,9 +143,9 @@ struct Identified {
   GainBySize by_size{};            ///< b0 at small and at large u
   GainInMotion in_motion{};        ///< b0 in motion and at standstill, of order 2; not if `held`
 
-  /// Share of the rows at standstill in which friction holds the machine against u (orders 1, 2),
-  /// so that b0, pole and friction are fitted without u there; 0: it does not hold. Latency, lag
-  /// and dead time are of all rows.
+  /// Share of the rows at standstill in which friction holds the machine against u (order 2), so
+  /// that b0, pole and friction are fitted without u there; 0: it does not hold. Latency, lag and
+  /// dead time are of all rows.
   double held = 0;
   double rise = 0;                 ///< how fast y changes, over what b0 and pole allow (order 1)
   int late_rows = 0;               ///< rows by which u was taken earlier than it was logged

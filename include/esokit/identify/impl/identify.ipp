@@ -165,10 +165,9 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
   }
   // When exactly the machine stands is known to some rows only: so times are those of all rows.
   const Plateau of_all = result.plateau;
-  if (model.order <= 2 && options.friction && of_all.middle > 0) {
+  if (model.order == 2 && options.friction && of_all.middle > 0) {
     const PlateauPoint& plain = of_all.points[of_all.middle];
-    if (speed.empty())
-      speed = friction_speed(rows, model.order, chosen.fit.noise, chosen.fit.at.latency);
+    if (speed.empty()) speed = friction_speed(rows, 2, chosen.fit.noise, chosen.fit.at.latency);
     if (auto held = held_log(rows, model, bounds, plain.fit, speed)) {
       result.lead = lead_of(used, model, bounds, plain.fit);
       result.held = held->share;
