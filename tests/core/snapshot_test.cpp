@@ -258,7 +258,7 @@ TEST(Snapshot, TextHasTheWords) {
       {.observer_bandwidth = 50.0f, .input_gain = 3.0f, .sample_time = 1e-3f});
   const auto words = snapshot(*observer);
   const std::string text = snapshot_text("servo", words);
-  EXPECT_TRUE(text.starts_with("inline constexpr std::array<std::uint32_t, 15> servo = {\n"));
+  EXPECT_TRUE(text.starts_with("inline constexpr std::array<std::uint32_t, 16> servo = {\n"));
   EXPECT_TRUE(text.ends_with("};\n"));
   std::size_t at = text.find("0x");
   for (const std::uint32_t word : words) {
