@@ -115,7 +115,7 @@ from_log() {
       # It tells nothing of b0, so that the last digit of a sine decides what is seen in it: the pages
       # have to refuse it for the same reason.
       for at in windows linux; do
-        grep -o '<li>[a-z_]* = [^:]*: is the smallest relative error' "$out/pages/$at/$page" |
+        grep -o '<li>In numbers: [a-z_]* = [^:]*: is the smallest relative error' "$out/pages/$at/$page" |
           sed 's/ = .*//' >"$out/pages/$at.reason"
       done
       [[ -s $out/pages/linux.reason ]] && cmp "$out"/pages/{windows,linux}.reason
@@ -153,9 +153,9 @@ start() {
 # instantiate is compiled once.
 units=(
   "core/pack core/scalar core/lanes core/expected core/check core/matrix core/snapshot math/combinatorics math/fal math/fine_sum math/positivity analysis/integrator_chain"
-  "gain/continuous_gain gain/covariance_factor gain/feedback_gain gain/gain_interval gain/riccati observer/named_observer observer/predictor_corrector observer/cascade_identities adapter/outlier_gate"
+  "gain/continuous_gain gain/covariance_factor gain/feedback_gain gain/gain_interval gain/riccati gain/sampled_gain observer/named_observer observer/predictor_corrector observer/cascade_identities adapter/outlier_gate adapter/actuator_map"
   "observer/pack"
-  "control/adrc_law control/at_limits control/nonlinear_feedback tune/pid_conversion control/retune control/tracking_differentiator control/smooth_profile"
+  "control/adrc_law control/approach_profile control/at_limits control/nonlinear_feedback tune/pid_conversion control/retune control/tracking_differentiator control/smooth_profile"
   "control/experiment"
   "sim/plant sim/noise sim/counted_gaussian sim/signals sim/metrics analysis/dense identify/input_checks"
   "sim/runge_kutta model/linear_plant"
