@@ -41,7 +41,10 @@ template class DelayedInput<LinearEso<1>, 3>;
 template class Measured<LinearEso<1>, 1, 3>;
 template class PredictiveAdrc<Measured<LinearEso<1>, 1, 3>>;
 template class ActuatorMap<double>;
+// Older Clang instantiates members whose constraint does not hold, too.
+#if !defined(__clang__) || __clang_major__ >= 16
 template class MappedInput<LinearEso<1>>;
+#endif
 template class MappedInput<Guarded<LinearEso<1>>>;
 template class Adrc<MappedInput<LinearEso<1>>>;
 template class PredictiveAdrc<MappedInput<LinearEso<1>>>;
