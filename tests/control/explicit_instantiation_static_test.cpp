@@ -44,8 +44,8 @@ template class ActuatorMap<double>;
 // Older Clang instantiates members whose constraint does not hold, too.
 #if !defined(__clang__) || __clang_major__ >= 16
 template class MappedInput<LinearEso<1>>;
-#endif
 template class MappedInput<Guarded<LinearEso<1>>>;
+#endif
 template class Adrc<MappedInput<LinearEso<1>>>;
 template class PredictiveAdrc<MappedInput<LinearEso<1>>>;
 template class DisturbanceCompensator<MappedInput<LinearEso<1>>>;

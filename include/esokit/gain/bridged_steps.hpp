@@ -122,7 +122,7 @@ constexpr auto recovery_of(const S& decay) noexcept {
   recovery.longest_step = longest_step<Size, steps>(decay);
   constexpr RecoveryBound known = bounds(Size);
   if constexpr (known.reach < 0 || known.reach > 0) {
-    constexpr auto counting = [](int) { return BridgedSteps{known.reach}; };
+    constexpr auto counting = [](int) { return BridgedSteps{bounds(Size).reach}; };
     recovery.counted = longest_step<Size, counting>(decay);
     const Plain unit = static_cast<Plain>(recovery.counted + 1);
     recovery.per_octave = Plain(known.per_octave) * unit;
