@@ -401,6 +401,15 @@ class Filler {
     } else {
       MEMBER(limits, limits(member))
     }
+    if constexpr (requires {
+                    config.pole;
+                    config.bandwidth;
+                  }) {
+      number("pole", config.pole, {0, 0.05 / T});
+      if (order_ == 2) number("lag", config.lag, {T, 20 * T, true});
+      if (order_ == 2) number("dead_time", config.dead_time, {0, 3 * T});
+      number("bandwidth", config.bandwidth, {0.01 / T, 1 / T, true});
+    }
     if constexpr (requires { config.hand_over; }) {
       const bool relay = tape_.choice(2, "excitation") == 0;
       if (!relay) config.excitation = static_cast<decltype(config.excitation)>(1);

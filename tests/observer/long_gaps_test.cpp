@@ -153,7 +153,7 @@ class Adversary {
 template <class Observer>
 int growing(double share) {
   Random random(1 + asked("ESOKIT_ADVERSARY_SEED", 0));
-  const auto settings = asked("ESOKIT_ADVERSARY_SETTINGS", 40);
+  const auto settings = asked("ESOKIT_ADVERSARY_SETTINGS", 40 / esokit_test::stride);
   int found = 0;
   for (std::uint64_t done = 0; done < settings;) {
     const double unit = std::exp(random.uniform(std::log(0.02), std::log(3.0)));
