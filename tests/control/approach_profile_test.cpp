@@ -243,6 +243,8 @@ TEST(ApproachProfile, RefusesByRule) {
             "dead_time: must be at most Capacity samples, s:");
   EXPECT_EQ(rule([](auto& c) { c.input_gain = 1e308; }),
             "input_gain: times the range of u must be finite and positive");
+  EXPECT_EQ(rule([](auto& c) { c.lag = 1e307; }),
+            "lag: times the speed by the range of u must be finite");
   ApproachProfileConfig<1> first{.input_gain = 1.0,
                                  .limits = {.lower = -1.0, .upper = 1.0},
                                  .bandwidth = 1.0,

@@ -84,8 +84,11 @@ requires(detail::is_a_plain_scalar<S>()) class ApproachProfile {
                   S(S(Capacity) * config.sample_time), true});
     if (!rules) return rules.error();
     ApproachProfile profile(config);
-    rules.demand(is_finite(profile.half_speed_) && profile.half_speed_ > S(0), "input_gain",
-                 config.input_gain, "times the range of u must be finite and positive");
+    rules
+        .demand(is_finite(profile.half_speed_) && profile.half_speed_ > S(0), "input_gain",
+                config.input_gain, "times the range of u must be finite and positive")
+        .demand(is_finite(S(S(8) * profile.half_speed_ * config.lag)), "lag", config.lag,
+                "times the speed by the range of u must be finite");
     if (!rules) return rules.error();
     return profile;
   }
