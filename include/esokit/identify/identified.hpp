@@ -25,10 +25,10 @@ namespace esokit {
 
 /// Options of an identification.
 struct IdentifyOptions {
-  [[no_unique_address]] ByName<IdentifyOptions> by_name{};  ///< nothing to set, see ByName
-  std::vector<int> orders{1, 2, 3};                         ///< the orders n to try
-  bool friction = true;  ///< a column tanh(v / v_s) for orders 1 and 2
-  bool pole = true;      ///< whether the plant may have a pole
+  ByName<IdentifyOptions> by_name{};  ///< nothing to set, see ByName
+  std::vector<int> orders{1, 2, 3};   ///< the orders n to try
+  bool friction = true;               ///< a column tanh(v / v_s) for orders 1 and 2
+  bool pole = true;                   ///< whether the plant may have a pole
 
   /// Columns y, y^2 and y^3 (gravity, springs) for orders 2 and 3, if they improve the fit.
   bool position = true;

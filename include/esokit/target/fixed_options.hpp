@@ -26,10 +26,10 @@ struct FixedCode;
 
 /// How a design is to be written in fixed point.
 struct FixedPointOptions {
-  [[no_unique_address]] ByName<FixedPointOptions> by_name{};  ///< nothing to set, see ByName
-  CountedSignal y{};                                          ///< the measurement
-  CountedSignal u{};                                          ///< what the actuator held
-  int innovation_bits = 32;                                   ///< 16 (fewer instructions) or 32
+  ByName<FixedPointOptions> by_name{};  ///< nothing to set, see ByName
+  CountedSignal y{};                    ///< the measurement
+  CountedSignal u{};                    ///< what the actuator held
+  int innovation_bits = 32;             ///< 16 (fewer instructions) or 32
 
   /// For each estimate what rounding may do at most, in its unit; not given or zero: what half a
   /// count of y does.

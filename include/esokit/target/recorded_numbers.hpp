@@ -13,7 +13,7 @@ namespace esokit {
 
 /// How a text of another language is to be written.
 struct CodeOptions {
-  [[no_unique_address]] ByName<CodeOptions> by_name{};  ///< nothing to set, see ByName
+  ByName<CodeOptions> by_name{};    ///< nothing to set, see ByName
   std::string name = "controller";  ///< begins every name and the files: an identifier of C with a
                                     ///< small letter, none of a header of C (`math`); in Structured
                                     ///< Text none of its words. Its capitals begin the constants,
