@@ -138,21 +138,22 @@ void motor(Report& report) {
   const auto course = [&](const auto& loop, double dead, double seconds) {
     return run(loop, Motor{.dead = dead}, seconds, one, nothing);
   };
-  const auto swing = [&](const auto& loop, double dead) {
+  const auto oscillation = [&](const auto& loop, double dead) {
     return 1e3 * furthest(course(loop, dead, 20), 1, 10, 20);
   };
-  const double without = swing(loops.without, 3);
-  const double with = swing(loops.with, 3);
-  report.expect("motor", "error without (mrad)", without, without > 50, "it swings for ever");
+  const double without = oscillation(loops.without, 3);
+  const double with = oscillation(loops.with, 3);
+  report.expect("motor", "error without (mrad)", without, without > 50, "a limit cycle");
   report.expect("motor", "error with (mrad)", with, with < 1e3 * count, "below a count");
   double less = 0;
   for (const double dead : {0.0, 0.75, 1.5, 2.25, 2.7})
-    less = std::max(less, swing(loops.with, dead));
+    less = std::max(less, oscillation(loops.with, dead));
   report.expect("motor, dead zone 0 .. 2.7 V", "error with 3 V (mrad)", less, less < 7, "chatters");
-  const double more = swing(loops.with, 3.6);
-  report.expect("motor, dead zone 3.6 V", "error with 3 V (mrad)", more, more > less, "swings");
-  report.expect("motor, dead zone 3.6 V", "error without (mrad)", swing(loops.without, 3.6), true,
-                "");
+  const double more = oscillation(loops.with, 3.6);
+  report.expect("motor, dead zone 3.6 V", "error with 3 V (mrad)", more, more > less,
+                "a limit cycle");
+  report.expect("motor, dead zone 3.6 V", "error without (mrad)", oscillation(loops.without, 3.6),
+                true, "");
   draw(report, "motor", "A motor that does nothing below 3 of 12 V, to be at 1 rad.", "angle (rad)",
        "u (V)", course(loops.without, 3, 4), course(loops.with, 3, 4));
 }
@@ -206,7 +207,7 @@ void thruster(Report& report) {
 int main(int argc, char** argv) {
   Report report(argc, argv, "actuator", "actuator",
                 {.paper_title = "Actuators",
-                 .citation = "No paper. Public threads in which the same wish came back",
+                 .citation = "No paper. Public threads that ask for an inverse map or a dead zone",
                  .link = "",
                  .title = "A dead zone, two gains, a square",
                  .description = "With MappedInput and without it."});

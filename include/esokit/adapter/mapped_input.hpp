@@ -6,7 +6,6 @@
 #include <esokit/adapter/adapter.hpp>
 #include <esokit/core/lanes.hpp>
 #include <esokit/core/type_tag.hpp>
-#include <type_traits>
 #include <utility>
 
 namespace esokit {
@@ -92,25 +91,17 @@ requires(detail::goes_into_a_loop<Observer>()) class MappedInput
   [[nodiscard]] const Map& map() const noexcept { return rest_.map; }
   /// The effect of u.
   [[nodiscard]] ESOKIT_INLINE S effect_of(const S& u) const noexcept { return map().effect(u); }
-  /// The same of what somebody reports: a number that is not finite stays one, also under
-  /// -ffast-math, where the lines of a curve may make it finite.
-  [[nodiscard]] S told(const S& u) const noexcept {
-    if constexpr (std::is_floating_point_v<S>) {
-      if (!is_finite(u)) return u;
-    }
-    return effect_of(u);
-  }
   /// The u with this effect.
   [[nodiscard]] ESOKIT_INLINE S input_for(const S& effect) const noexcept {
     return map().input(effect);
   }
 
   /// One sample, see PredictorCorrector::update. @param u_applied of the actuator, not its effect
-  StatusType update(S y, S u_applied) noexcept { return observer_.update(y, told(u_applied)); }
+  StatusType update(S y, S u_applied) noexcept { return observer_.update(y, reported(u_applied)); }
   /// Time update only, see PredictorCorrector::predict.
-  StatusType predict(S u_applied) noexcept { return observer_.predict(told(u_applied)); }
+  StatusType predict(S u_applied) noexcept { return observer_.predict(reported(u_applied)); }
 
-  /// Members of the observer that are told or give a u.
+  /// Members of the observer that take or give a u.
   /// @{
   [[nodiscard]] S applied_input() const noexcept {
     return detail::clipped(input_for(observer_.applied_input()));
@@ -124,7 +115,7 @@ requires(detail::goes_into_a_loop<Observer>()) class MappedInput
   StatusType revise_input(const S& u_applied) noexcept requires requires(Observer& o, const S& s) {
     o.revise_input(s);
   }
-  { return observer_.revise_input(told(u_applied)); }
+  { return observer_.revise_input(reported(u_applied)); }
   S hold(const S& u_applied) noexcept requires guards {
     return input_for(observer_.hold(effect_of(u_applied)));
   }
@@ -227,6 +218,12 @@ requires(detail::goes_into_a_loop<Observer>()) class MappedInput
     return detail::LaneAccess::correct_all(observer_, y);
   }
   /// @}
+
+  /// The effect of a u that somebody reports: what is not finite stays so, also under -ffast-math,
+  /// where the lines of a curve may make a number of it.
+  [[nodiscard]] S reported(const S& u) const noexcept {
+    return select(is_finite(u), effect_of(u), u);
+  }
 
   struct Rest {
     Map map;
