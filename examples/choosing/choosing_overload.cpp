@@ -293,7 +293,7 @@ Outcome with_order(const Drawn& all, const esokit::TunedDesign& design, std::uin
 std::optional<std::array<double, 3>> price(const esokit::TuneModel& model,
                                            const esokit::Tuning& tuning) {
   constexpr esokit::TuneRules free{
-      .damping_latencies = 0.0, .bandwidth_ratio = 0.0, .play = esokit::TunePlay::none};
+      .damping_latencies = 0.0, .bandwidth_ratio = 0.0, .simulate = esokit::TuneSimulation::none};
   auto free_of_log = free;
   free_of_log.filter_floor = 0.0;
   const auto unruled = compiled::tune(model, {}, free);

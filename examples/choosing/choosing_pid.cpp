@@ -1,4 +1,4 @@
-// ADRC against the best PIDs, all tuned by `tune` and `tune_rivals` for the same J, to the same
+// ADRC against the best PIDs, all tuned by `tune` and `tune_pids` for the same J, to the same
 // margins and the same noise in u, on four machines of the trades. Designed once on the nominal
 // machine, run on drawn ones.
 //
@@ -134,7 +134,7 @@ Running running(const PlainPidConfig& config, const TuneModel& model, Lost rule,
 }
 
 /// @param whole whether with variants and rules, else only the two of ADRC and the best PID
-std::vector<Row> rows_of(const Tuning& tuning, const std::vector<TunedRival>& rivals, bool whole) {
+std::vector<Row> rows_of(const Tuning& tuning, const std::vector<TunedPid>& baselines, bool whole) {
   std::vector<Row> rows;
   const TuneModel& model = tuning.model;
   // Without the gain for a gap: a lost y is replaced by the predicted one, so that the next
@@ -169,21 +169,22 @@ std::vector<Row> rows_of(const Tuning& tuning, const std::vector<TunedRival>& ri
   };
   adrc("ADRC, recommended", *tuning.chosen(), true);
   for (const TunedDesign& d : tuning.designs) {
-    if (d.numbers != 2 || !d.feasible || !d.comes_back) continue;
+    if (d.numbers != 2 || !d.feasible || !d.recovers) continue;
     adrc("ADRC, two bandwidths", d, true);
     break;
   }
   if (whole) adrc("ADRC, recommended, no gain for gaps", *tuning.chosen(), false);
-  const auto pid = [&](const std::string& name, const TunedRival& rival, double time, Lost rule,
+  const auto pid = [&](const std::string& name, const TunedPid& baseline, double time, Lost rule,
                        double bandwidth = 0.0) {
-    auto config = rival.pid;
+    auto config = baseline.pid;
     config.tracking_time = time > 0.0 ? std::max(time, config.sample_time) : 0.0;
-    rows.push_back({name, rival.design.numbers, rival.design.control_noise, rival.design.excess,
-                    rival.design.modulus_margin, [=, model = model](bool profile) {
+    rows.push_back({name, baseline.design.numbers, baseline.design.control_noise,
+                    baseline.design.excess, baseline.design.modulus_margin,
+                    [=, model = model](bool profile) {
                       return running(config, model, rule, bandwidth, profile);
                     }});
   };
-  const TunedRival& best = rivals.front();
+  const TunedPid& best = baselines.front();
   const double ti = best.pid.integral_time(), td = best.pid.derivative_time();
   pid("PID, best", best, std::sqrt(ti * td), Lost::y);
   if (!whole) return rows;
@@ -196,21 +197,21 @@ std::vector<Row> rows_of(const Tuning& tuning, const std::vector<TunedRival>& ri
   const auto& law = tuning.chosen()->settings.gains;
   pid("PID, reference model", best, std::sqrt(ti * td), Lost::error,
       1.5 * detail::law_mean(law, model.order));
-  for (const TunedRival& rival : rivals) {
-    if (rival.kind == RivalKind::filtered && &rival != &best && rival.design.feasible)
-      pid("PID, damping 0.707", rival, rival.pid.tracking_time, Lost::y);
-    if (rival.kind == RivalKind::pi && rival.design.feasible)
-      pid("PI, best", rival, rival.pid.tracking_time, Lost::y);
+  for (const TunedPid& baseline : baselines) {
+    if (baseline.kind == PidKind::filtered && &baseline != &best && baseline.design.feasible)
+      pid("PID, damping 0.707", baseline, baseline.pid.tracking_time, Lost::y);
+    if (baseline.kind == PidKind::pi && baseline.design.feasible)
+      pid("PI, best", baseline, baseline.pid.tracking_time, Lost::y);
   }
   // By rules. SIMC is slowed down until it is as quiet as asked; AMIGO has nothing to choose.
   const auto ruled = [&](const std::string& name, PlainPidConfig config) {
     config.tracking_time = std::sqrt(config.integral_time() * config.derivative_time());
     config.tracking_time = std::max(config.tracking_time, model.sample_time);
-    auto rival = compiled::given_rival(tuning, config);
-    if (!rival || rival->design.constraint == "stability") return false;
-    if (name == "SIMC" && rival->design.control_noise > tuning.control_noise) return false;
-    rival->design.numbers = 0;
-    pid(name, *rival, config.tracking_time, Lost::y);
+    auto baseline = compiled::given_pid(tuning, config);
+    if (!baseline || baseline->design.constraint == "stability") return false;
+    if (name == "SIMC" && baseline->design.control_noise > tuning.control_noise) return false;
+    baseline->design.numbers = 0;
+    pid(name, *baseline, config.tracking_time, Lost::y);
     return true;
   };
   const double b0 = model.input_gain.value;
@@ -276,7 +277,7 @@ Outcome run(const Machine& machine, const Case& asked, Running controller, std::
   const double T = model.sample_time, latency = model.latency();
   const double half = 0.5 * (model.u_max - model.u_min), b0 = model.input_gain.value;
   const auto n = static_cast<std::size_t>(model.order);
-  const double way = asked.step * play_distance(model, 1.0, play_events.back());
+  const double way = asked.step * overload_distance(model, 1.0, overloads.back());
   const double moving = 60.0 * latency, b = machine.b * asked.gain;
   constexpr int parts = 5;
   const double h = T / parts;
@@ -477,15 +478,15 @@ int main(int argc, char** argv) {
                                       Marker::cross};
   std::size_t drawn_machines = 0;
   for (const Machine& nominal : machines()) {
-    const TuneWish wish{.control_noise =
-                            nominal.noise * (nominal.model.u_max - nominal.model.u_min)};
+    const TuneSpecification wish{.control_noise =
+                                     nominal.noise * (nominal.model.u_max - nominal.model.u_min)};
     const auto tuning = compiled::tune(nominal.model, wish);
     if (!tuning || tuning->chosen() == nullptr) {
       report.expect(nominal.name, "designs", 0.0, false, "there is one");
       continue;
     }
-    const auto rivals = compiled::tune_rivals(*tuning);
-    auto rows = rows_of(*tuning, rivals, true);
+    const auto baselines = compiled::tune_pids(*tuning);
+    auto rows = rows_of(*tuning, baselines, true);
     const std::size_t right = rows.size();
     for (const Wrong wrong : {Wrong::no_lag, Wrong::order}) {
       TuneModel model = mistaken(nominal.model, wrong);
@@ -495,7 +496,7 @@ int main(int argc, char** argv) {
         report.expect(nominal.name, "designs for a wrong model", 0.0, false, "there is one");
         continue;
       }
-      for (Row& row : rows_of(*made, compiled::tune_rivals(*made), false)) {
+      for (Row& row : rows_of(*made, compiled::tune_pids(*made), false)) {
         row.wrong = wrong;
         rows.push_back(std::move(row));
       }
@@ -618,8 +619,8 @@ int main(int argc, char** argv) {
     }
     report.expect(nominal.name, "noise in u, away from the one asked for, %", noise_apart,
                   noise_apart < 2.0, "< 2");
-    report.expect(nominal.name, "root of J / J* of the best PID", rivals.front().design.excess,
-                  rivals.front().design.feasible && rivals.front().design.comes_back,
+    report.expect(nominal.name, "root of J / J* of the best PID", baselines.front().design.excess,
+                  baselines.front().design.feasible && baselines.front().design.recovers,
                   "keeps the rules and comes back");
   }
   report.add(figure);

@@ -442,7 +442,7 @@ int main(int argc, char** argv) {
       model.u_max = 1.0;
       TuneRules rules;
       rules.modulus_margin = 1.0 / largest_sensitivity;
-      rules.play = TunePlay::none;
+      rules.simulate = TuneSimulation::none;
       // So large that J is nearly the ISE of a load step, as far as the noise allows.
       double fast = 16.0;
       for (;; fast *= 0.5) {
@@ -459,11 +459,11 @@ int main(int argc, char** argv) {
       report.expect(plant.name, "designs", 0.0, false, "there is one");
       continue;
     }
-    const auto rivals = compiled::tune_rivals(*tuning);
-    const auto rival = std::find_if(rivals.begin(), rivals.end(), [](const TunedRival& of) {
-      return of.kind == RivalKind::filtered;
+    const auto baselines = compiled::tune_pids(*tuning);
+    const auto baseline = std::find_if(baselines.begin(), baselines.end(), [](const TunedPid& of) {
+      return of.kind == PidKind::filtered;
     });
-    const PlainPidConfig best = best_pid(judge, {by_simc, by_amigo, rival->pid}, of_amigo.noise);
+    const PlainPidConfig best = best_pid(judge, {by_simc, by_amigo, baseline->pid}, of_amigo.noise);
     const Judged least = judge(detail::pid_form(best));
     report.check_reference(plant.name, "load IAE of the best PID", plant.least, least.iae, 0.003,
                            "scipy");
@@ -473,7 +473,7 @@ int main(int argc, char** argv) {
         "within the limits, also of noise");
     std::array<Judged, 5> all{judge(detail::pid_form(by_simc)),
                               of_amigo,
-                              judge(detail::pid_form(rival->pid)),
+                              judge(detail::pid_form(baseline->pid)),
                               judge(tuning->chosen()->controller),
                               {}};
     const auto two_numbers =

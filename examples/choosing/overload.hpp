@@ -14,7 +14,7 @@
 #include <vector>
 
 #include <esokit/control/smooth_profile.hpp>
-#include <esokit/tune/problem.hpp>
+#include <esokit/tune/specification.hpp>
 
 namespace overload_example {
 

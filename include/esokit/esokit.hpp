@@ -223,12 +223,12 @@
 #include <esokit/tune/families.hpp>
 #include <esokit/tune/loop_cost.hpp>
 #include <esokit/tune/lqg.hpp>
+#include <esokit/tune/overload.hpp>
+#include <esokit/tune/pid_baselines.hpp>
 #include <esokit/tune/pid_conversion.hpp>
 #include <esokit/tune/plain_pid.hpp>
-#include <esokit/tune/play.hpp>
-#include <esokit/tune/problem.hpp>
-#include <esokit/tune/rivals.hpp>
 #include <esokit/tune/search.hpp>
+#include <esokit/tune/specification.hpp>
 #include <esokit/tune/tune.hpp>
 #include <esokit/tune/tune_search.hpp>
 #include <esokit/tune/tuned_code.hpp>

@@ -897,7 +897,7 @@ TEST(Plateau, AtTheLowestBandwidthsReachesToWhatIsAbove) {
 
 // y'' = 2 u - 0.3 y': of the two orders at a low bandwidth the right one leaves far less, from
 // either side.
-TEST(Rival, IsTheOtherOrderWhereB0WasFound) {
+TEST(OtherOrder, IsTheOtherOrderWhereB0WasFound) {
   esokit::sim::Gaussian gaussian(5);
   esokit::FitData data;
   data.sample_time = T;
@@ -916,16 +916,16 @@ TEST(Rival, IsTheOtherOrderWhereB0WasFound) {
     esokit::InnovationsFit fit(data, order.model, order.bounds);
     order.fit = fit.minimise({1.0, 2 * T, 0.5, 0}, false);
   }
-  const auto low = esokit::detail::rival_of(data, orders, 1, 1, orders[0].fit);
+  const auto low = esokit::detail::other_order_of(data, orders, 1, 1, orders[0].fit);
   EXPECT_EQ(low.order, 2);
   EXPECT_LT(low.left, 0.3);
-  const auto right = esokit::detail::rival_of(data, orders, 2, 1, orders[1].fit);
+  const auto right = esokit::detail::other_order_of(data, orders, 2, 1, orders[1].fit);
   EXPECT_GT(right.left, 3);
   // Of a force that depends on position there is no order 1.
-  EXPECT_EQ(esokit::detail::rival_of(data, orders, 2, 1, orders[1].fit, 2).order, 3);
-  // Orders that were not asked for are rivals, too: from the low side and from the high one.
+  EXPECT_EQ(esokit::detail::other_order_of(data, orders, 2, 1, orders[1].fit, 2).order, 3);
+  // Orders that were not asked for are tried, too: from the low side and from the high one.
   const auto given = [&](const esokit::OrderFit& only) {
-    return esokit::detail::rival_of(data, {only}, only.model.order, 1, only.fit);
+    return esokit::detail::other_order_of(data, {only}, only.model.order, 1, only.fit);
   };
   EXPECT_EQ(given(orders[0]).order, 2);
   EXPECT_LT(given(orders[0]).left, 0.3);
@@ -933,7 +933,7 @@ TEST(Rival, IsTheOtherOrderWhereB0WasFound) {
 }
 
 // The same machine with friction: an order that was given is refused like one that was found.
-TEST(Rival, RefusesAnOrderGivenTooHigh) {
+TEST(OtherOrder, RefusesAnOrderGivenTooHigh) {
   esokit::sim::Gaussian gaussian(5);
   Log log;
   log.sample_time = 0.01;
@@ -950,18 +950,18 @@ TEST(Rival, RefusesAnOrderGivenTooHigh) {
   IdentifyOptions options;
   options.orders = {3};
   const auto found = esokit::study(log, options).value();
-  EXPECT_EQ(found.rival.order, 2);
-  EXPECT_LT(found.rival.left, 0.1);
+  EXPECT_EQ(found.other_order.order, 2);
+  EXPECT_LT(found.other_order.left, 0.1);
   EXPECT_TRUE(said(esokit::judge(found, log, options)).starts_with("order: "));
   options.orders = {2};
   const auto right = esokit::study(log, options).value();
-  EXPECT_GT(right.rival.left, 0.9);
+  EXPECT_GT(right.other_order.left, 0.9);
   EXPECT_EQ(said(esokit::judge(right, log, options)), "accepted");
   EXPECT_NEAR(right.input_gain.value, 2, right.input_gain.half_width);
   // A known column of y would show order 1 the y that it has to predict.
   log.columns = {log.y};
   options.position = false;
-  EXPECT_EQ(esokit::study(log, options).value().rival.order, 3);
+  EXPECT_EQ(esokit::study(log, options).value().other_order.order, 3);
 }
 
 TEST(Judge, RefusesByName) {
@@ -1081,9 +1081,9 @@ TEST(Judge, RefusesByName) {
   bad.at_once = true;
   EXPECT_TRUE(said(esokit::judge(bad, log)).starts_with("at_once: "));
   bad = good;
-  bad.rival = {2, 0.37};
+  bad.other_order = {2, 0.37};
   EXPECT_TRUE(esokit::judge(bad, log));
-  bad.rival.left = 0.36;
+  bad.other_order.left = 0.36;
   EXPECT_TRUE(said(esokit::judge(bad, log)).starts_with("order: "));
   // Jitter that the stamps tell was taken out.
   bad = good;

@@ -17,7 +17,7 @@
 #include <esokit/sim/gaussian.hpp>
 #include <esokit/sim/run.hpp>
 #include <esokit/tune/controller.hpp>
-#include <esokit/tune/rivals.hpp>
+#include <esokit/tune/pid_baselines.hpp>
 #include <esokit/tune/tune.hpp>
 #include <limits>
 #include <random>
@@ -316,7 +316,7 @@ TEST(TuneTest, FiguresAreThoseOfTheController) {
     models.push_back(drawn_problem(random, 1 + i % 2));
   int compared = 0, limited = 0;
   for (const TuneModel& given : models) {
-    const auto tuning = tune(given, {}, {.play = esokit::TunePlay::none});
+    const auto tuning = tune(given, {}, {.simulate = esokit::TuneSimulation::none});
     if (!tuning) continue;
     for (const TunedDesign& design : tuning->designs) {
       if (design.constraint == "stability") continue;
@@ -705,8 +705,8 @@ TEST(TuneTest, TakesTheFastLawWhereItCostsNothing) {
 /// Whether a design comes back without softening at its limits.
 bool back_as_designed(TunedDesign design, const TuneModel& model) {
   design.settings.soften = false;
-  esokit::detail::play_law(design, model);
-  return design.comes_back;
+  esokit::detail::simulate_law(design, model);
+  return design.recovers;
 }
 
 // Without the rules for the limits the best loop swings between them for ever unless its law is
@@ -723,7 +723,7 @@ TEST(TuneTest, WhatIsChosenComesBackFromTheLimits) {
   model.sample_time = 1.8e-3;
   model.disturbance = model.disturbance_of(0.2 / model.latency());
   const esokit::TuneRules old{
-      .damping_latencies = 0.0, .bandwidth_ratio = 0.0, .play = esokit::TunePlay::all};
+      .damping_latencies = 0.0, .bandwidth_ratio = 0.0, .simulate = esokit::TuneSimulation::all};
   const auto before = tune(model, {}, old).value();
   const TunedDesign& fast =
       *std::min_element(before.designs.begin(), before.designs.end(),
@@ -732,7 +732,7 @@ TEST(TuneTest, WhatIsChosenComesBackFromTheLimits) {
   EXPECT_LT(fast.damping_latencies, 1.0);
   // It needs the softened law, and is lost without.
   EXPECT_FALSE(back_as_designed(fast, before.model));
-  const auto tuning = tune(model, {}, {.play = esokit::TunePlay::all}).value();
+  const auto tuning = tune(model, {}, {.simulate = esokit::TuneSimulation::all}).value();
   ASSERT_NE(tuning.chosen(), nullptr);
   EXPECT_TRUE(alarms(tuning, *tuning.chosen()).empty());
   const TunedDesign& chosen = *tuning.chosen();
@@ -744,31 +744,29 @@ TEST(TuneTest, WhatIsChosenComesBackFromTheLimits) {
     const TunedDesign& a = tuning.designs[i];
     if (i > 0) {
       const TunedDesign& b = tuning.designs[i - 1];
-      const auto rank = [](const TunedDesign& d) {
-        return !d.feasible ? 0 : !d.comes_back ? 1 : 2;
-      };
+      const auto rank = [](const TunedDesign& d) { return !d.feasible ? 0 : !d.recovers ? 1 : 2; };
       EXPECT_GE(rank(b), rank(a)) << a.name;
     }
-    EXPECT_EQ(a.played, a.feasible) << a.name;
+    EXPECT_EQ(a.simulated, a.feasible) << a.name;
     if (!a.feasible) continue;
     EXPECT_GE(a.damping_latencies, 1.3 * 0.999) << a.name;
-    EXPECT_EQ(a.comes_back, a.lost.empty()) << a.name;
-    const auto variants = esokit::played_variants(tuning.model);
+    EXPECT_EQ(a.recovers, a.lost.empty()) << a.name;
+    const auto variants = esokit::simulated_variants(tuning.model);
     EXPECT_EQ(variants.size(), 5U);
-    const auto played = esokit::play(
+    const auto played = esokit::simulate_overload(
         variants[static_cast<std::size_t>(a.lost_on)].model,
         variants[static_cast<std::size_t>(a.lost_on)].gain, a.controller,
-        a.comes_back ? esokit::play_events[0] : a.lost_in, a.settling_time, [](auto...) {},
-        a.played_law());
-    EXPECT_EQ(played.back, a.comes_back) << a.name;
+        a.recovers ? esokit::overloads[0] : a.lost_in, a.settling_time, [](auto...) {},
+        a.softening_law());
+    EXPECT_EQ(played.back, a.recovers) << a.name;
   }
 }
 
 // A law whose k_1 / k_0 is a tenth of the latency is stable, keeps its margins, and is lost.
-TEST(PlayTest, TellsALoopThatSwingsForEver) {
+TEST(OverloadTest, TellsALoopThatSwingsForEver) {
   TuneModel model = servo();
   const esokit::TuneRules free{
-      .damping_latencies = 0.0, .bandwidth_ratio = 0.0, .play = esokit::TunePlay::all};
+      .damping_latencies = 0.0, .bandwidth_ratio = 0.0, .simulate = esokit::TuneSimulation::all};
   const auto fast =
       tune(model, {.controller_bandwidth = 2.0 / (0.58 * model.latency())}, free).value();
   const auto slow = tune(model, {.controller_bandwidth = 1.9 / (1.3 * model.latency())}).value();
@@ -782,14 +780,15 @@ TEST(PlayTest, TellsALoopThatSwingsForEver) {
 
 // Played until one comes back: the same is chosen as of those that are all played, and of the
 // others nothing is said.
-TEST(PlayTest, PlaysUntilOneComesBack) {
+TEST(OverloadTest, SimulatesUntilOneRecovers) {
   TuneModel fast = servo();
   for (const double law : {1.9 / (1.3 * fast.latency()), 2.0 / (0.58 * fast.latency())}) {
-    const auto made = [&](esokit::TunePlay play) {
-      const esokit::TuneRules free{.damping_latencies = 0.0, .bandwidth_ratio = 0.0, .play = play};
+    const auto made = [&](esokit::TuneSimulation which) {
+      const esokit::TuneRules free{
+          .damping_latencies = 0.0, .bandwidth_ratio = 0.0, .simulate = which};
       return tune(fast, {.controller_bandwidth = law}, free).value();
     };
-    const auto first = made(esokit::TunePlay::first), all = made(esokit::TunePlay::all);
+    const auto first = made(esokit::TuneSimulation::first), all = made(esokit::TuneSimulation::all);
     ASSERT_EQ(first.chosen() != nullptr, all.chosen() != nullptr);
     if (first.chosen() != nullptr) {
       EXPECT_EQ(first.chosen()->name, all.chosen()->name);
@@ -799,12 +798,12 @@ TEST(PlayTest, PlaysUntilOneComesBack) {
       const TunedDesign& same = named(all, design.name);
       EXPECT_EQ(design.cost, same.cost) << design.name;
       if (!design.feasible) continue;
-      if (design.played) {
-        EXPECT_EQ(design.comes_back, same.comes_back) << design.name;
+      if (design.simulated) {
+        EXPECT_EQ(design.recovers, same.recovers) << design.name;
         EXPECT_EQ(design.settings.soften, same.settings.soften) << design.name;
-        EXPECT_TRUE(&design == first.chosen() || !design.comes_back || design.settings.soften)
+        EXPECT_TRUE(&design == first.chosen() || !design.recovers || design.settings.soften)
             << design.name;
-        back = back || design.comes_back;
+        back = back || design.recovers;
       } else {
         EXPECT_NE(first.chosen(), nullptr) << design.name;
         const auto said = alarms(first, design);
@@ -813,14 +812,14 @@ TEST(PlayTest, PlaysUntilOneComesBack) {
       }
     }
     EXPECT_EQ(back, first.chosen() != nullptr);
-    for (const TunedDesign& design : made(esokit::TunePlay::none).designs) {
-      EXPECT_FALSE(design.played) << design.name;
+    for (const TunedDesign& design : made(esokit::TuneSimulation::none).designs) {
+      EXPECT_FALSE(design.simulated) << design.name;
     }
   }
 }
 
 // What is played is what runs: Adrc on the plant of the model, sample by sample.
-TEST(PlayTest, IsTheRealController) {
+TEST(OverloadTest, IsTheRealController) {
   TuneModel model = servo();
   model.pole = 0.0;
   const auto tuning = tune(model).value();
@@ -851,14 +850,15 @@ TEST(PlayTest, IsTheRealController) {
           });
       ASSERT_TRUE(ran);
       std::size_t k = 0, limited = 0;
-      (void)esokit::play(model, 1.0, design.controller, esokit::play_events[0],
-                         design.settling_time, [&](double, double, double output, double input) {
-                           if (k >= y.size()) return;
-                           EXPECT_NEAR(output, y[k], 1e-6) << k;
-                           EXPECT_NEAR(input, u[k], 1e-4) << k;
-                           limited += std::abs(input) >= 5.0 ? 1U : 0U;
-                           ++k;
-                         });
+      (void)esokit::simulate_overload(model, 1.0, design.controller, esokit::overloads[0],
+                                      design.settling_time,
+                                      [&](double, double, double output, double input) {
+                                        if (k >= y.size()) return;
+                                        EXPECT_NEAR(output, y[k], 1e-6) << k;
+                                        EXPECT_NEAR(input, u[k], 1e-4) << k;
+                                        limited += std::abs(input) >= 5.0 ? 1U : 0U;
+                                        ++k;
+                                      });
       EXPECT_GT(k, 200U);
       EXPECT_GT(limited, 50U);
     }
@@ -866,21 +866,21 @@ TEST(PlayTest, IsTheRealController) {
 }
 
 // Also where the law is softened: a law of order 3 whose linear form swings for ever.
-TEST(PlayTest, PlaysTheSoftenedLawAsItRuns) {
+TEST(OverloadTest, PlaysTheSoftenedLawAsItRuns) {
   TuneModel model = servo();
   model.order = 3;
   model.pole = 0.0;
   model.friction = 0.0;
   const auto tuning = tune(model, {.controller_bandwidth = 0.3 / model.latency()},
-                           {.bandwidth_ratio = 0.0, .play = esokit::TunePlay::all})
+                           {.bandwidth_ratio = 0.0, .simulate = esokit::TuneSimulation::all})
                           .value();
   const TunedDesign& design = named(tuning, "LinearEso");
   ASSERT_TRUE(design.feasible);
   ASSERT_TRUE(design.settings.soften);
-  ASSERT_FALSE(design.played_law().gains.empty());
+  ASSERT_FALSE(design.softening_law().gains.empty());
   EXPECT_NE(design.code.find(".soften = true"), std::string::npos);
-  const auto plain = esokit::play(model, 1.0, design.controller, esokit::play_events[1],
-                                  design.settling_time, [](auto...) {});
+  const auto plain = esokit::simulate_overload(model, 1.0, design.controller, esokit::overloads[1],
+                                               design.settling_time, [](auto...) {});
   EXPECT_FALSE(plain.back);
   using Rigid = esokit::LinearPlant<3>;
   const auto plant = with_lag(
@@ -908,15 +908,15 @@ TEST(PlayTest, PlaysTheSoftenedLawAsItRuns) {
             u.push_back(sample.input);
           });
       ASSERT_TRUE(ran);
-      (void)esokit::play(
-          model, 1.0, design.controller, esokit::play_events[0], design.settling_time,
+      (void)esokit::simulate_overload(
+          model, 1.0, design.controller, esokit::overloads[0], design.settling_time,
           [&](double, double, double output, double input) {
             if (k >= y.size()) return;
             EXPECT_NEAR(output, y[k], 1e-6 * (1.0 + std::abs(y[k]))) << k;
             EXPECT_NEAR(input, u[k], 1e-3) << k;
             ++k;
           },
-          design.played_law());
+          design.softening_law());
       auto same = controller;
       for (std::size_t i = 0; i < y.size(); ++i) {
         (void)same.update(y[i], 0.0);
@@ -935,24 +935,25 @@ TEST(TuneTest, SoftensOnlyWhatIsLostWithoutIt) {
   model.order = 3;
   model.pole = 0.0;
   model.friction = 0.0;
-  const auto tuning = tune(model, {}, {.play = esokit::TunePlay::all}).value();
+  const auto tuning = tune(model, {}, {.simulate = esokit::TuneSimulation::all}).value();
   int plain = 0, soft = 0;
   bool softened = false;
   for (const TunedDesign& design : tuning.designs) {
     if (!design.feasible) continue;
-    const auto alone = esokit::played_variants(tuning.model);
+    const auto alone = esokit::simulated_variants(tuning.model);
     bool lost = false;
     for (const auto& variant : alone) {
-      for (const auto& event : esokit::play_events) {
-        const auto played = esokit::play(variant.model, variant.gain, design.controller, event,
-                                         design.settling_time, [](auto...) {});
+      for (const auto& event : esokit::overloads) {
+        const auto played =
+            esokit::simulate_overload(variant.model, variant.gain, design.controller, event,
+                                      design.settling_time, [](auto...) {});
         lost = lost || (played.counts && !played.back);
       }
     }
     EXPECT_EQ(design.settings.soften, lost) << design.name;
-    EXPECT_EQ(design.played_law().gains.empty(), !lost) << design.name;
+    EXPECT_EQ(design.softening_law().gains.empty(), !lost) << design.name;
     ++(lost ? soft : plain);
-    if (!design.comes_back) continue;
+    if (!design.recovers) continue;
     EXPECT_TRUE(lost || !softened) << design.name;
     softened = softened || lost;
   }
@@ -962,7 +963,7 @@ TEST(TuneTest, SoftensOnlyWhatIsLostWithoutIt) {
 
 // A load that grows moves the machine once it is above the friction: y = load (t - t0)^3 / 6, with
 // and without a sensor's lag, for which the states have other units. u is zero.
-TEST(PlayTest, FrictionHoldsUntilTheForceIsLarger) {
+TEST(OverloadTest, FrictionHoldsUntilTheForceIsLarger) {
   TuneModel model = servo();
   model.order = 3;
   model.pole = 0.0;
@@ -977,17 +978,17 @@ TEST(PlayTest, FrictionHoldsUntilTheForceIsLarger) {
     model.friction = load * 5.0 * latency;
     const double whole = load * std::pow(5.0 * latency, 3) / 6.0;
     double moved = 0.0;
-    (void)esokit::play(model, 1.0, idle, esokit::friction_events[0], 1.0,
-                       [&](double t, double, double y, double u) {
-                         EXPECT_EQ(u, 0.0);
-                         if (t > 10.0 * latency) return;
-                         const double since = std::max(t - 5.0 * latency, 0.0);
-                         moved = load * std::pow(since, 3) / 6.0;
-                         // The sensor is late by its lag.
-                         if (sensor > 0.0 && since < latency) return;
-                         EXPECT_NEAR(y, load * std::pow(since - sensor, 3) / 6.0, 0.03 * whole)
-                             << t;
-                       });
+    (void)esokit::simulate_overload(
+        model, 1.0, idle, esokit::friction_overloads[0], 1.0,
+        [&](double t, double, double y, double u) {
+          EXPECT_EQ(u, 0.0);
+          if (t > 10.0 * latency) return;
+          const double since = std::max(t - 5.0 * latency, 0.0);
+          moved = load * std::pow(since, 3) / 6.0;
+          // The sensor is late by its lag.
+          if (sensor > 0.0 && since < latency) return;
+          EXPECT_NEAR(y, load * std::pow(since - sensor, 3) / 6.0, 0.03 * whole) << t;
+        });
     EXPECT_GT(moved, 0.9 * whole);
   }
 }
@@ -998,7 +999,7 @@ TEST(TuneTest, OrderThreeHasToStandFriction) {
   TuneModel model = servo();
   model.order = 3;
   model.pole = 0.0;
-  const esokit::TuneRules all{.play = esokit::TunePlay::all};
+  const esokit::TuneRules all{.simulate = esokit::TuneSimulation::all};
   const auto unknown = tune(model, {}, all).value();
   EXPECT_EQ(unknown.chosen(), nullptr);
   EXPECT_TRUE(unknown.designs.front().feasible);
@@ -1006,7 +1007,7 @@ TEST(TuneTest, OrderThreeHasToStandFriction) {
     if (!design.feasible) continue;
     EXPECT_NE(design.lost.find("friction"), std::string::npos) << design.name;
     EXPECT_EQ(std::string(alarms(unknown, design).front().name), "overload") << design.name;
-    EXPECT_TRUE(esokit::swings_with_friction(unknown.model, design.controller)) << design.name;
+    EXPECT_TRUE(esokit::oscillates_with_friction(unknown.model, design.controller)) << design.name;
   }
   model.friction = 1e-300;
   EXPECT_TRUE(model.may_rub());
@@ -1020,14 +1021,15 @@ TEST(TuneTest, OrderThreeHasToStandFriction) {
   for (const TunedDesign& design : first_order.designs) {
     if (!design.feasible) continue;
     EXPECT_GE(design.damping_latencies, 1.3 * 0.999 * 11.0) << design.name;
-    if (!design.comes_back) continue;
+    if (!design.recovers) continue;
     ++kept;
-    EXPECT_FALSE(esokit::swings_with_friction(first_order.model, design.controller)) << design.name;
-    for (const auto& variant : esokit::played_variants(first_order.model)) {
-      for (const auto& event : esokit::played_events(variant.model)) {
-        const auto played = esokit::play(
+    EXPECT_FALSE(esokit::oscillates_with_friction(first_order.model, design.controller))
+        << design.name;
+    for (const auto& variant : esokit::simulated_variants(first_order.model)) {
+      for (const auto& event : esokit::overloads_of(variant.model)) {
+        const auto played = esokit::simulate_overload(
             variant.model, variant.gain, design.controller, event,
-            design.played_settling(variant.model), [](auto...) {}, design.played_law());
+            design.simulated_settling(variant.model), [](auto...) {}, design.softening_law());
         EXPECT_TRUE(played.back || !played.counts) << design.name;
       }
     }
@@ -1037,14 +1039,14 @@ TEST(TuneTest, OrderThreeHasToStandFriction) {
 
 // Order 2 is softened, and as designed where only that comes back; neither ranks behind.
 TEST(TuneTest, SoftensOrderTwo) {
-  const auto tuning = tune(servo(), {}, {.play = esokit::TunePlay::all}).value();
+  const auto tuning = tune(servo(), {}, {.simulate = esokit::TuneSimulation::all}).value();
   int soft = 0;
   for (const TunedDesign& design : tuning.designs) {
     if (!design.feasible) continue;
     TunedDesign again = design;
     again.settings.soften = true;
-    esokit::detail::play_law(again, tuning.model);
-    EXPECT_EQ(design.settings.soften, again.comes_back) << design.name;
+    esokit::detail::simulate_law(again, tuning.model);
+    EXPECT_EQ(design.settings.soften, again.recovers) << design.name;
     soft += design.settings.soften ? 1 : 0;
   }
   EXPECT_GT(soft, 0);
@@ -1098,9 +1100,10 @@ TEST(TuneTest, NamesTheNearestThatKeepsTheRule) {
   const auto hasty = tune(model, {.settling_time = 0.02});
   ASSERT_FALSE(hasty);
   EXPECT_STREQ(hasty.error().field, "settling_time");
-  EXPECT_STREQ(hasty.error().rule,
-               "is so short for this latency that the loop would swing at its limits for ever; "
-               "must be at least");
+  EXPECT_STREQ(
+      hasty.error().rule,
+      "is so short for this latency that the loop would oscillate between its limits for ever; "
+      "must be at least");
   EXPECT_TRUE(tune(model, {.settling_time = 1.001 * hasty.error().limit}));
 }
 
@@ -1114,7 +1117,7 @@ TEST(TuneTest, SettlesInTheTimeAsked) {
     for (const double latencies : {40.0, 120.0}) {
       const double wish = latencies * model.latency();
       const auto tuning =
-          tune(model, {.settling_time = wish}, {.play = esokit::TunePlay::none}).value();
+          tune(model, {.settling_time = wish}, {.simulate = esokit::TuneSimulation::none}).value();
       EXPECT_EQ(tuning.settling_time, wish);
       ASSERT_NE(tuning.chosen(), nullptr) << order;
       TunedDesign design = *tuning.chosen();
@@ -1140,7 +1143,7 @@ TEST(TuneTest, SettlesInTheTimeAsked) {
 TEST(TuneTest, ReckonsWithAFloorOfTheDisturbance) {
   TuneModel quiet = servo();
   quiet.disturbance = quiet.disturbance_of(0.001 / quiet.latency());
-  const esokit::TuneRules plain_rules{.play = esokit::TunePlay::none};
+  const esokit::TuneRules plain_rules{.simulate = esokit::TuneSimulation::none};
   const auto raised = tune(quiet, {.controller_bandwidth = 10.0}, plain_rules).value();
   EXPECT_NEAR(raised.model.filter_bandwidth() * quiet.latency(), 0.4, 1e-9);
   EXPECT_EQ(raised.model_disturbance, quiet.disturbance);
@@ -1149,7 +1152,7 @@ TEST(TuneTest, ReckonsWithAFloorOfTheDisturbance) {
     other.order = order;
     other.disturbance = other.disturbance_of(0.01 / other.latency());
     const auto bandwidth = [&](TuneRules rules) {
-      rules.play = esokit::TunePlay::none;
+      rules.simulate = esokit::TuneSimulation::none;
       return tune(other, {.controller_bandwidth = 10.0}, rules).value().model.filter_bandwidth() *
              other.latency();
     };
@@ -1186,9 +1189,9 @@ TEST(TuneTest, NeverRaisesWhatItMayAsk) {
   EXPECT_STREQ(refused.error().field, "control_noise");
   EXPECT_EQ(refused.error().value, 0.5);
   EXPECT_GT(refused.error().limit, 0.5);
-  const auto stated =
-      tune(model, {.control_noise = 1.5 * refused.error().limit}, {.play = esokit::TunePlay::none})
-          .value();
+  const auto stated = tune(model, {.control_noise = 1.5 * refused.error().limit},
+                           {.simulate = esokit::TuneSimulation::none})
+                          .value();
   const auto said = alarms(stated, stated.designs.front());
   EXPECT_TRUE(std::any_of(said.begin(), said.end(), [](const esokit::TuneAlarm& alarm) {
     return std::string(alarm.name) == "noise";
@@ -1202,7 +1205,7 @@ TEST(TuneTest, NeverRaisesWhatItMayAsk) {
 TEST(TuneTest, MoreNoiseIsNeverWorseInEverything) {
   esokit_test::Random random(
       static_cast<std::uint64_t>(testing::UnitTest::GetInstance()->random_seed()));
-  const TuneRules rules{.play = esokit::TunePlay::none};
+  const TuneRules rules{.simulate = esokit::TuneSimulation::none};
   int pairs = 0;
   for (int order = 1; order <= 3; ++order) {
     TuneModel model = plain(order);
@@ -1257,7 +1260,7 @@ TEST(TuneTest, NamesTheRuleThatLimits) {
                         .damping_latencies = 0.0,
                         .bandwidth_ratio = 0.0,
                         .filter_floor = 0.0,
-                        .play = esokit::TunePlay::none};
+                        .simulate = esokit::TuneSimulation::none};
   const double free = linear(loose).cost;
   const std::pair<const char*, TuneRules> cases[] = {{"modulus margin",
                                                       [&] {
@@ -1360,7 +1363,7 @@ TEST(TuneTest, SimulatedItDoesWhatWasPredicted) {
 }
 
 TEST(TuneTest, RefusesWhatIsNoProblem) {
-  const auto refused = [](const auto& change, esokit::TuneWish wish = {}) {
+  const auto refused = [](const auto& change, esokit::TuneSpecification wish = {}) {
     TuneModel model = plain(1);
     change(model);
     const auto tuning = tune(model, wish);
@@ -1467,10 +1470,10 @@ TEST(TuneModelTest, RefusesWhatIsTooFarApart) {
   }
 }
 
+using esokit::PidKind;
 using esokit::PlainPid;
 using esokit::PlainPidConfig;
-using esokit::RivalKind;
-using esokit::TunedRival;
+using esokit::TunedPid;
 
 /// A PID of each structure.
 std::vector<PlainPidConfig> pids() {
@@ -1494,7 +1497,7 @@ std::vector<PlainPidConfig> pids() {
 
 // What is judged is what runs: sample by sample beside the form that is told the applied u, in and
 // out of the limits.
-TEST(RivalTest, ThePidIsItsLinearForm) {
+TEST(PidBaselineTest, ThePidIsItsLinearForm) {
   for (const PlainPidConfig& config : pids()) {
     const auto form = esokit::detail::pid_form(config);
     auto pid = PlainPid::make(config).value();
@@ -1522,7 +1525,7 @@ TEST(RivalTest, ThePidIsItsLinearForm) {
   }
 }
 
-TEST(RivalTest, ThePidStopsItsIntegralOrFollowsTheLimit) {
+TEST(PidBaselineTest, ThePidStopsItsIntegralOrFollowsTheLimit) {
   PlainPidConfig config = pids()[0];
   const auto left_after = [&](double tracking_time) {
     config.tracking_time = tracking_time;
@@ -1543,7 +1546,7 @@ TEST(RivalTest, ThePidStopsItsIntegralOrFollowsTheLimit) {
 }
 
 // What is pasted runs on a machine: a bad number keeps u, and changes nothing.
-TEST(RivalTest, ThePidKeepsItsOutputAtABadNumber) {
+TEST(PidBaselineTest, ThePidKeepsItsOutputAtABadNumber) {
   std::mt19937 random(11);
   for (const PlainPidConfig& config : pids()) {
     auto pid = PlainPid::make(config).value();
@@ -1576,7 +1579,7 @@ TEST(RivalTest, ThePidKeepsItsOutputAtABadNumber) {
   }
 }
 
-TEST(RivalTest, RefusesWhatIsNoPid) {
+TEST(PidBaselineTest, RefusesWhatIsNoPid) {
   const auto refused = [](auto change) {
     PlainPidConfig config = pids()[3];
     change(config);
@@ -1594,12 +1597,11 @@ TEST(RivalTest, RefusesWhatIsNoPid) {
             "sample_time: must be finite and positive");
   esokit::Tuning none;
   none.model = plain(1);
-  EXPECT_EQ(esokit_test::refusal(given_rival(none, pids()[0])),
-            "tuning.designs: must not be empty");
-  EXPECT_TRUE(tune_rivals(none).empty());
+  EXPECT_EQ(esokit_test::refusal(given_pid(none, pids()[0])), "tuning.designs: must not be empty");
+  EXPECT_TRUE(tune_pids(none).empty());
 }
 
-/// A tuning with nothing in it but its problem and one design, for the search of rivals.
+/// A tuning with nothing in it but its problem and one design, for the search of baselines.
 esokit::Tuning problem_of(const TuneModel& model, double bandwidth, const TuneRules& rules) {
   esokit::Tuning tuning;
   tuning.model = model;
@@ -1610,9 +1612,9 @@ esokit::Tuning problem_of(const TuneModel& model, double bandwidth, const TuneRu
   return tuning;
 }
 
-const TunedRival& rival_of(const std::vector<TunedRival>& all, RivalKind kind) {
+const TunedPid& pid_of(const std::vector<TunedPid>& all, PidKind kind) {
   return *std::find_if(all.begin(), all.end(),
-                       [kind](const TunedRival& rival) { return rival.kind == kind; });
+                       [kind](const TunedPid& baseline) { return baseline.kind == kind; });
 }
 
 const TuneRules no_rules{.modulus_margin = 0.0,
@@ -1621,40 +1623,40 @@ const TuneRules no_rules{.modulus_margin = 0.0,
                          .damping_latencies = 0.0,
                          .bandwidth_ratio = 0.0,
                          .filter_floor = 0.0,
-                         .play = esokit::TunePlay::none};
+                         .simulate = esokit::TuneSimulation::none};
 
 // scipy's simplex method on an own evaluation of J (Lyapunov equations of the loop, no frequency
 // grid), from starts of its own; equal to 0.25 %, in a flat valley of the filtered derivative.
-TEST(RivalTest, IsTheIndependentOptimum) {
+TEST(PidBaselineTest, IsTheIndependentOptimum) {
   const struct {
     int order;
     double input_gain, pole, lag, bandwidth;
-    std::vector<std::pair<RivalKind, double>> costs;
+    std::vector<std::pair<PidKind, double>> costs;
   } cases[] = {{2,
                 3.0,
                 0.0,
                 0.0,
                 20.0,
-                {{RivalKind::derivative, 1.313489458e-06},
-                 {RivalKind::filtered, 4.663246774e-07},
-                 {RivalKind::freely_filtered, 4.663202933e-07}}},
+                {{PidKind::derivative, 1.313489458e-06},
+                 {PidKind::filtered, 4.663246774e-07},
+                 {PidKind::freely_filtered, 4.663202933e-07}}},
                {2,
                 -3.0,
                 2.0,
                 0.015,
                 15.0,
-                {{RivalKind::derivative, 1.135414727e-06},
-                 {RivalKind::filtered, 3.811867285e-07},
-                 {RivalKind::freely_filtered, 3.794139223e-07}}},
+                {{PidKind::derivative, 1.135414727e-06},
+                 {PidKind::filtered, 3.811867285e-07},
+                 {PidKind::freely_filtered, 3.794139223e-07}}},
                {1,
                 1.0,
                 1.0,
                 0.02,
                 20.0,
-                {{RivalKind::pi, 3.029533376e-07},
-                 {RivalKind::derivative, 3.029506154e-07},
-                 {RivalKind::filtered, 1.257341639e-07},
-                 {RivalKind::freely_filtered, 1.25511375e-07}}}};
+                {{PidKind::pi, 3.029533376e-07},
+                 {PidKind::derivative, 3.029506154e-07},
+                 {PidKind::filtered, 1.257341639e-07},
+                 {PidKind::freely_filtered, 1.25511375e-07}}}};
   for (const auto& c : cases) {
     TuneModel model = plain(c.order);
     model.input_gain = {c.input_gain, 0.0};
@@ -1663,10 +1665,10 @@ TEST(RivalTest, IsTheIndependentOptimum) {
     model.disturbance = model.disturbance_of(c.bandwidth);
     model.u_min = -50.0;
     model.u_max = 50.0;
-    const auto rivals = tune_rivals(problem_of(model, c.bandwidth, no_rules));
-    ASSERT_EQ(rivals.size(), 4U);
+    const auto baselines = tune_pids(problem_of(model, c.bandwidth, no_rules));
+    ASSERT_EQ(baselines.size(), 4U);
     for (const auto& [kind, cost] : c.costs) {
-      EXPECT_NEAR(rival_of(rivals, kind).design.cost / cost, 1.0, 3e-3)
+      EXPECT_NEAR(pid_of(baselines, kind).design.cost / cost, 1.0, 3e-3)
           << c.order << ' ' << static_cast<int>(kind);
     }
   }
@@ -1674,7 +1676,7 @@ TEST(RivalTest, IsTheIndependentOptimum) {
 
 // The PID with a filter of second order is the free poles of order 2 where its loop around the
 // chain b0 / s^2 is stable, and never worse.
-TEST(RivalTest, ThePidIsTheFreePoles) {
+TEST(PidBaselineTest, ThePidIsTheFreePoles) {
   esokit_test::Random random(47);
   int stable = 0;
   for (int i = 0; i < 3; ++i) {
@@ -1684,8 +1686,8 @@ TEST(RivalTest, ThePidIsTheFreePoles) {
     const double w = random.uniform(3.0, 20.0);
     model.disturbance = model.disturbance_of(w);
     const auto tuning = tune(model, {.controller_bandwidth = 0.0}, no_rules).value();
-    const auto rivals = tune_rivals(tuning);
-    const TunedRival& pid = rival_of(rivals, RivalKind::freely_filtered);
+    const auto baselines = tune_pids(tuning);
+    const TunedPid& pid = pid_of(baselines, PidKind::freely_filtered);
     const auto free =
         std::find_if(tuning.designs.begin(), tuning.designs.end(), [](const TunedDesign& design) {
           return design.family == TuneFamily::free_poles && !design.knows.any();
@@ -1702,11 +1704,11 @@ TEST(RivalTest, ThePidIsTheFreePoles) {
       EXPECT_GE(ratio, 0.999) << i;
     }
     // As a controller, too: the conversion of the design has its poles and zeros.
-    const esokit::detail::RivalSearch search(tuning);
+    const esokit::detail::PidSearch search(tuning);
     const auto x = search.equal_to(free->controller);
     ASSERT_EQ(x.size(), 5U);
     const auto equal = esokit::detail::closed_upon_itself(
-        esokit::detail::pid_form(search.settings(RivalKind::freely_filtered, x)));
+        esokit::detail::pid_form(search.settings(PidKind::freely_filtered, x)));
     esokit::detail::FastResponse a(free->controller), b(equal);
     for (const double v : {0.001, 0.01, 0.1, 1.0}) {
       const auto there = std::polar(1.0, v) - 1.0;
@@ -1716,18 +1718,18 @@ TEST(RivalTest, ThePidIsTheFreePoles) {
   EXPECT_GE(stable, 2);
 }
 
-TEST(RivalTest, KeepsTheRulesOfTheFamilies) {
+TEST(PidBaselineTest, KeepsTheRulesOfTheFamilies) {
   TuneModel model = servo();
   const auto tuning = tune(model).value();
-  const auto rivals = tune_rivals(tuning);
-  ASSERT_EQ(rivals.size(), 4U);
+  const auto baselines = tune_pids(tuning);
+  ASSERT_EQ(baselines.size(), 4U);
   const LoopCost cost(tuning.model, tuning.rules, 0.1);
   bool all = true;
-  for (const TunedRival& rival : rivals) {
-    const TunedDesign& d = rival.design;
-    EXPECT_EQ(d.numbers, rival.kind == RivalKind::pi                ? 2
-                         : rival.kind == RivalKind::freely_filtered ? 5
-                                                                    : 4);
+  for (const TunedPid& baseline : baselines) {
+    const TunedDesign& d = baseline.design;
+    EXPECT_EQ(d.numbers, baseline.kind == PidKind::pi                ? 2
+                         : baseline.kind == PidKind::freely_filtered ? 5
+                                                                     : 4);
     if (!d.feasible) {
       all = false;
       EXPECT_NE(d.constraint, "none") << d.name;
@@ -1739,27 +1741,27 @@ TEST(RivalTest, KeepsTheRulesOfTheFamilies) {
     EXPECT_GE(numbers.delay, 0.995 * 2.0 * model.sample_time) << d.name;
     EXPECT_LE(numbers.control_noise, 1.002 * tuning.control_noise) << d.name;
     EXPECT_NEAR(numbers.cost(tuning.rho, model.input_gain.value) / d.cost, 1.0, 2e-3) << d.name;
-    EXPECT_TRUE(d.played) << d.name;
+    EXPECT_TRUE(d.simulated) << d.name;
     EXPECT_NE(d.code.find("PlainPid::make({.proportional = "), std::string::npos);
     // Given as it is, it is the same.
-    const auto given = given_rival(tuning, rival.pid).value();
+    const auto given = given_pid(tuning, baseline.pid).value();
     EXPECT_EQ(given.design.cost, d.cost) << d.name;
-    EXPECT_EQ(given.design.comes_back, d.comes_back) << d.name;
-    const auto same = migration(tuning, rival, d);
+    EXPECT_EQ(given.design.recovers, d.recovers) << d.name;
+    const auto same = migration(tuning, baseline, d);
     EXPECT_TRUE(same.gains.empty() && same.losses.empty()) << d.name;
     EXPECT_EQ(same.ties.size(), 8U) << d.name;
   }
   // A PID that is too weak in everything, and one that is not stable.
-  PlainPidConfig weak = rivals.front().pid;
+  PlainPidConfig weak = baselines.front().pid;
   weak.proportional *= 0.25;
   weak.integral *= 0.05;
   weak.derivative *= 0.25;
-  const auto change = migration(tuning, given_rival(tuning, weak).value(), *tuning.chosen());
+  const auto change = migration(tuning, given_pid(tuning, weak).value(), *tuning.chosen());
   EXPECT_FALSE(change.gains.empty());
   EXPECT_FALSE(change.losses.empty());  // noise in u
   EXPECT_NE(change.gains.front().find("load"), std::string::npos);
   weak.proportional = -weak.proportional;
-  const auto lost = migration(tuning, given_rival(tuning, weak).value(), *tuning.chosen());
+  const auto lost = migration(tuning, given_pid(tuning, weak).value(), *tuning.chosen());
   ASSERT_EQ(lost.gains.size(), 1U);
   EXPECT_NE(lost.gains.front().find("not stable"), std::string::npos);
 }

@@ -2,15 +2,15 @@
 
 namespace esokit::examples::compiled {
 
-Expected<Tuning, Error<double>> tune(const TuneModel& model, const TuneWish& wish,
+Expected<Tuning, Error<double>> tune(const TuneModel& model, const TuneSpecification& specification,
                                      const TuneRules& rules) {
-  return esokit::tune(model, wish, rules);
+  return esokit::tune(model, specification, rules);
 }
 
-std::vector<TunedRival> tune_rivals(const Tuning& tuning) { return esokit::tune_rivals(tuning); }
+std::vector<TunedPid> tune_pids(const Tuning& tuning) { return esokit::tune_pids(tuning); }
 
-Expected<TunedRival, Error<double>> given_rival(const Tuning& tuning, const PlainPidConfig& pid) {
-  return esokit::given_rival(tuning, pid);
+Expected<TunedPid, Error<double>> given_pid(const Tuning& tuning, const PlainPidConfig& pid) {
+  return esokit::given_pid(tuning, pid);
 }
 
 }  // namespace esokit::examples::compiled

@@ -4,18 +4,18 @@
 
 #include <vector>
 
-#include <esokit/tune/rivals.hpp>
+#include <esokit/tune/pid_baselines.hpp>
 
 namespace esokit::examples::compiled {
 
 /// esokit::tune
 [[nodiscard]] Expected<Tuning, Error<double>> tune(const TuneModel& model,
-                                                   const TuneWish& wish = {},
+                                                   const TuneSpecification& specification = {},
                                                    const TuneRules& rules = {});
-/// esokit::tune_rivals
-[[nodiscard]] std::vector<TunedRival> tune_rivals(const Tuning& tuning);
-/// esokit::given_rival
-[[nodiscard]] Expected<TunedRival, Error<double>> given_rival(const Tuning& tuning,
-                                                              const PlainPidConfig& pid);
+/// esokit::tune_pids
+[[nodiscard]] std::vector<TunedPid> tune_pids(const Tuning& tuning);
+/// esokit::given_pid
+[[nodiscard]] Expected<TunedPid, Error<double>> given_pid(const Tuning& tuning,
+                                                          const PlainPidConfig& pid);
 
 }  // namespace esokit::examples::compiled

@@ -40,7 +40,7 @@ the machine:
   --limits LOW,HIGH   of u, in the unit of the log (default: the range of u in the log)
   --b0 B              the input gain that you expect: an alarm if the log shows another one
   --friction F        order 3: Coulomb friction on y'', unit of y''; 0: none (default: not known, and
-                      only a design that comes back with friction is recommended)
+                      only a design that recovers with friction is recommended)
 the requirement, one of:
   --noise PERCENT     standard deviation of u that noise may cause, % of its range (default 5)
   --settling S        settling time of a step of the reference, s
@@ -49,7 +49,7 @@ the controller that the machine has now:
   --pid KP,KI,KD,TF[,TT]  u = KP e + KI int e + KD e', TF of the filter on e', s (0: none), TT of
                       back-calculation, s (0 or left out: the integral stops at the limits): what
                       you gain and lose by changing, and what the best PIDs do
-more margin than usual; every design is played within the limits, whatever its margins are:
+more margin than usual; every design is simulated within the limits, whatever its margins are:
   --modulus M         modulus margin, smallest abs(1 + L), below 1 (default 0.5)
   --delay N           delay margin in samples (default 2)
   --phase DEGREES     phase margin (default: none beside the others)
@@ -65,7 +65,7 @@ With --out but without a file: example pages from the logs of real machines in e
 
 exit codes: 0 page with a design; 1 page not written; 2 file or options not understood; 3 log
 refused: the page says what was found and what to record instead; 4 page with an alarm, or no
-design keeps the margins and comes back from an overload
+design keeps the margins and recovers from an overload
 )";
 
 double number(const std::string& option, const std::string& text) {

@@ -74,9 +74,9 @@ std::string overshoot_text(const StepOfCode& step) {
 }
 
 /// Who wins, in words: J is what everything was tuned for.
-std::string against_pid(const std::vector<esokit::TunedRival>& rivals,
+std::string against_pid(const std::vector<esokit::TunedPid>& baselines,
                         const esokit::TunedDesign& taken) {
-  const esokit::TunedDesign& best = rivals.front().design;
+  const esokit::TunedDesign& best = baselines.front().design;
   if (!best.feasible) {
     return "No PID keeps these rules; the nearest, " + best.name + ", misses: " + best.constraint +
            ".";
@@ -86,8 +86,7 @@ std::string against_pid(const std::vector<esokit::TunedRival>& rivals,
                            " tuned numbers; this design: " + std::to_string(taken.numbers) + ")";
   // Of the deviations, as in the table: the root of J.
   const std::string by = percent(std::abs(std::sqrt(ratio) - 1.0));
-  const std::string lost =
-      best.comes_back ? "" : " But it does not come back from " + best.lost + ".";
+  const std::string lost = best.recovers ? "" : " But it does not recover from " + best.lost + ".";
   if (ratio > 1.01) {
     return "The best PID under the same rules is the " + what + "; its deviations of y and u are " +
            by + " larger." + lost;
@@ -125,19 +124,19 @@ std::string what_measuring_saves(const esokit::Tuning& tuning, const esokit::Tun
   wide.model.u_min = -1e9 * (tuning.model.u_max - tuning.model.u_min);
   wide.model.u_max = -wide.model.u_min;
   const auto largest = [&](bool measures) {
-    Pasting played = pasting;
-    played.friction = 0.0;
-    played.by_position = false;
+    Pasting simulated = pasting;
+    simulated.friction = 0.0;
+    simulated.by_position = false;
     Acting measured{.force = force};
-    for (Feed& feed : played.feeds) {
+    for (Feed& feed : simulated.feeds) {
       measured.w.push_back(rows.columns[feed.column]);
       feed.rest = measured.w.back()[0];
       if (!measures) feed.factor = 0.0;
     }
     double most = 0.0;
     for (const double y :
-         step_of_code(played, wide, taken, 0.0, T * (rows_double - 1.0), 0.0, 0, &measured).y)
-      most = std::max(most, std::abs(y - played.start_y));
+         step_of_code(simulated, wide, taken, 0.0, T * (rows_double - 1.0), 0.0, 0, &measured).y)
+      most = std::max(most, std::abs(y - simulated.start_y));
     return most;
   };
   return "Measuring " + names + " saves: in this log it takes " +
@@ -168,7 +167,7 @@ Design Design::make(const Settings& settings, const Input& input, const Findings
   auto model = as_printed(esokit::tune_model(found, limits.first, limits.second));
   model.friction = settings.friction;
   const double range = limits.second - limits.first;
-  esokit::TuneWish wish;
+  esokit::TuneSpecification wish;
   wish.settling_time = settings.settling_time;
   wish.controller_bandwidth = settings.controller;
   if (settings.noise_share > 0.0) wish.control_noise = settings.noise_share * range;
@@ -177,11 +176,12 @@ Design Design::make(const Settings& settings, const Input& input, const Findings
   std::string sooner;
   if (!tuning && std::string_view(tuning.error().field) == "settling_time" &&
       wish.settling_time > tuning.error().limit) {
-    sooner =
-        "A settling time of " + number_text(wish.settling_time, 3) +
-        " s is longer than this machine takes by itself, " + number_text(tuning.error().limit, 3) +
-        " s, so it cannot be asked of a feedback: the design is that without a wish. To move more "
-        "slowly, let the reference move slowly.";
+    sooner = "A settling time of " + number_text(wish.settling_time, 3) +
+             " s is longer than this machine takes by itself, " +
+             number_text(tuning.error().limit, 3) +
+             " s, so it cannot be asked of a feedback: the design is that without this "
+             "specification. To move more "
+             "slowly, let the reference move slowly.";
     wish.settling_time = 0.0;
     tuning = esokit::tune(model, wish, settings.rules);
   }
@@ -207,7 +207,7 @@ Design Design::make(const Settings& settings, const Input& input, const Findings
         rank > 0 ? "There is no design of rank " + std::to_string(settings.rank) +
                        " that keeps the rules."
         : tuning->designs.front().feasible
-            ? "No design is recommended: none comes back from an overload, the first not from " +
+            ? "No design is recommended: none recovers from an overload, the first not from " +
                   tuning->designs.front().lost +
                   (model.may_rub() ? ". " + three_integrators
                                    : ". Relax the requirement: --noise, --settling, --omega-c.")
@@ -237,9 +237,9 @@ Design Design::make(const Settings& settings, const Input& input, const Findings
     design.alarms_.push_back({alarm.name, alarm.text});
   // Of order 1 no further than u holds against the pole.
   const double duration = std::min(10 * taken.settling_time + 300 * model.latency(), 200'000.0 * T);
-  const StepOfCode step =
-      step_of_code(design.pasting_, *tuning, taken,
-                   esokit::play_distance(model, 1.0, esokit::play_events.back()), duration, 0.0, 0);
+  const StepOfCode step = step_of_code(
+      design.pasting_, *tuning, taken,
+      esokit::overload_distance(model, 1.0, esokit::overloads.back()), duration, 0.0, 0);
   design.summary_ = {
       "Chosen: " + taken.name + ". A step of the reference by " + number_text(step.height, 3) +
           ", through the profile of the code, settles in " + duration_text(step.settling) +
@@ -255,30 +255,30 @@ Design Design::make(const Settings& settings, const Input& input, const Findings
           "°, each the smallest over the intervals. Deviations of y and u are " +
           number_text(taken.excess, 3) +
           " times those of the best linear controller, which keeps no margins."};
-  design.rivals_ = esokit::tune_rivals(*tuning);
-  design.summary_.push_back(against_pid(design.rivals_, taken));
-  if (const auto& best = design.rivals_.front(); best.design.feasible) {
+  design.baselines_ = esokit::tune_pids(*tuning);
+  design.summary_.push_back(against_pid(design.baselines_, taken));
+  if (const auto& best = design.baselines_.front(); best.design.feasible) {
     const StepOfCode bare = step_of_pid(design.pasting_, model, best.pid, step.height, duration);
     design.summary_.push_back("The same step, given at once to the " + best.design.name +
                               ", settles in " + duration_text(bare.settling) + " and " +
                               overshoot_text(bare) + ".");
   }
   if (settings.pid) {
-    const auto given = esokit::given_rival(*tuning, *settings.pid);
+    const auto given = esokit::given_pid(*tuning, *settings.pid);
     if (!given) throw LogError("--pid: " + esokit::to_text(given.error()));
     design.migration_ = esokit::migration(*tuning, *given, taken);
-    design.to_best_ = esokit::migration(*tuning, *given, design.rivals_.front().design);
+    design.to_best_ = esokit::migration(*tuning, *given, design.baselines_.front().design);
     design.migrates_ = true;
-    design.rivals_.push_back(*given);
+    design.baselines_.push_back(*given);
   }
-  if (taken.played && taken.comes_back) {
+  if (taken.simulated && taken.recovers) {
     design.summary_.push_back(
-        "It was played with limits and noise, on the model and at the ends of its intervals: it "
-        "comes back from " +
-        esokit::detail::in_words(esokit::play_events[0], model) + ", from " +
-        esokit::detail::in_words(esokit::play_events[1], model) + ", from " +
-        esokit::detail::in_words(esokit::play_events[2], model) + " and from " +
-        esokit::detail::in_words(esokit::play_events[3], model) + ".");
+        "It was simulated with limits and noise, on the model and at the ends of its intervals: it "
+        "recovers from " +
+        esokit::detail::in_words(esokit::overloads[0], model) + ", from " +
+        esokit::detail::in_words(esokit::overloads[1], model) + ", from " +
+        esokit::detail::in_words(esokit::overloads[2], model) + " and from " +
+        esokit::detail::in_words(esokit::overloads[3], model) + ".");
   }
   if (tuning->model.disturbance > 1.001 * tuning->model_disturbance) {
     design.summary_.push_back(
@@ -410,27 +410,27 @@ Figure tradeoff_figure(const esokit::Tuning& tuning, std::size_t taken) {
   return figure;
 }
 
-/// The event that a design does not come back from.
+/// The event that a design does not recover from.
 Figure lost_figure(const esokit::Tuning& tuning, const esokit::TunedDesign& design) {
   Figure figure("overload", {.rows = 2, .columns = 1, .panel_height = 150});
-  figure.caption("This is why designs rank behind: " + design.name + " does not come back from " +
+  figure.caption("This is why designs rank behind: " + design.name + " does not recover from " +
                  design.lost + ". Played with limits and noise.");
-  const auto variants = esokit::played_variants(tuning.model);
+  const auto variants = esokit::simulated_variants(tuning.model);
   const auto& variant = variants[static_cast<std::size_t>(design.lost_on)];
   std::vector<double> t, y, u;
-  const auto played = esokit::play(
+  const auto simulated = esokit::simulate_overload(
       variant.model, variant.gain, design.controller, design.lost_in,
-      design.played_settling(variant.model),
+      design.simulated_settling(variant.model),
       [&](double now, double, double output, double control) {
         t.push_back(now);
         y.push_back(output);
         u.push_back(control);
       },
-      design.played_law());
+      design.softening_law());
   // The event and what comes first tell it.
   const auto rows = std::min<std::size_t>(
       t.size(), static_cast<std::size_t>((5 * design.lost_in.latencies * tuning.model.latency() +
-                                          std::min(played.time, 5 * design.settling_time)) /
+                                          std::min(simulated.time, 5 * design.settling_time)) /
                                          tuning.model.sample_time));
   for (auto* column : {&t, &y, &u}) column->resize(rows);
   figure.panel(0, 0)
@@ -445,27 +445,27 @@ Figure lost_figure(const esokit::Tuning& tuning, const esokit::TunedDesign& desi
   return figure;
 }
 
-/// C++ of a rival that compiles as it is and checks itself.
-std::string rival_program(const esokit::TunedRival& rival) {
+/// C++ of a baseline that compiles as it is and checks itself.
+std::string pid_program(const esokit::TunedPid& baseline) {
   const auto exact = [](double value) {
     char text[32];
     std::snprintf(text, sizeof text, "%.17g", value);
     return std::string(text);
   };
-  auto pid = esokit::PlainPid::make(rival.pid).value();
-  const double half = 0.5 * (rival.pid.upper - rival.pid.lower);
-  const double step = 0.02 * half / std::abs(rival.pid.proportional);
+  auto pid = esokit::PlainPid::make(baseline.pid).value();
+  const double half = 0.5 * (baseline.pid.upper - baseline.pid.lower);
+  const double step = 0.02 * half / std::abs(baseline.pid.proportional);
   std::string wanted;
   for (int k = 0; k < 12; ++k)
     wanted += (k > 0 ? "," : "") + std::string(k % 4 == 0 ? "\n      " : " ") +
               exact(pid.update(step * (k % 5), 10 * step));
-  return "// The rival " + rival.design.name + R"(, as from_log tuned it.
+  return "// " + baseline.design.name + R"(, as from_log tuned it.
 #include <cmath>
 #include <cstdio>
 #include <esokit/tune/plain_pid.hpp>
 
 int main() {
-  )" + rival.design.code +
+  )" + baseline.design.code +
          R"(  if (!controller) return 1;
   // Self-check: the u that from_log computed.
   const double wanted[] = {)" +
@@ -486,29 +486,29 @@ int main() {
 }
 
 std::vector<CsvRow> ranking(const esokit::Tuning& tuning,
-                            const std::vector<esokit::TunedRival>& rivals) {
+                            const std::vector<esokit::TunedPid>& baselines) {
   const double range = tuning.model.u_max - tuning.model.u_min;
   std::vector<CsvRow> rows{{"", "tuned numbers", "times the best", "the same without margins",
                             "standard deviation of y", "noise in u, % of its range",
                             "y after a load of 10 %", "settling time of a small step (s)",
                             "modulus margin", "delay margin (ms)", "operations", "limited by"}};
-  // Zero where a design was not played.
-  const auto played = [](double value) { return value > 0.0 ? number_text(value, 3) : "-"; };
+  // Zero where a design was not simulated.
+  const auto simulated = [](double value) { return value > 0.0 ? number_text(value, 3) : "-"; };
   const auto row = [&](const std::string& before, const esokit::TunedDesign& d) {
     rows.push_back({before + d.name +
-                        (!d.feasible     ? " (does not keep the rules)"
-                         : !d.comes_back ? " (does not come back from an overload)"
-                                         : ""),
+                        (!d.feasible   ? " (does not keep the rules)"
+                         : !d.recovers ? " (does not recover from an overload)"
+                                       : ""),
                     d.numbers > 0 ? std::to_string(d.numbers) : "-", number_text(d.excess, 3),
                     number_text(d.free_excess, 3), number_text(d.output_deviation, 3),
                     number_text(100 * d.control_noise / range, 3),
-                    played(0.1 * range * d.load_peak), played(d.settling_time),
+                    simulated(0.1 * range * d.load_peak), simulated(d.settling_time),
                     number_text(d.modulus_margin, 2), number_text(1e3 * d.delay_margin, 3),
                     d.operations > 0 ? std::to_string(d.operations) : "-", d.constraint});
   };
   for (std::size_t i = 0; i < tuning.designs.size(); ++i)
     row(std::to_string(i + 1) + " ", tuning.designs[i]);
-  for (const auto& rival : rivals) row("rival: ", rival.design);
+  for (const auto& baseline : baselines) row("baseline: ", baseline.design);
   return rows;
 }
 
@@ -524,10 +524,10 @@ void Design::show_on(Page& page, const Findings& findings) const {
         "of y and u together, compared with the best linear controller (sqrt(J / J*); "
         "within 1 % the cheaper one comes first). The operations (sums, products, comparisons) "
         "are those of an update of the observer. --rank takes another row",
-        ranking(*tuning_, rivals_));
-    if (!rivals_.empty()) {
+        ranking(*tuning_, baselines_));
+    if (!baselines_.empty()) {
       page.text(
-          "Rivals are PIDs, each at its own optimum of the same J, under the same margins, "
+          "The PIDs are baselines, each at its own optimum of the same J, under the same margins, "
           "intervals and noise in u. J sees neither windup nor lost samples.");
     }
   }
@@ -548,7 +548,7 @@ void Design::show_on(Page& page, const Findings& findings) const {
                 ", omega_c = " + number_text(equal.controller_bandwidth, 3) +
                 " rad/s and omega_o = " + number_text(equal.observer_bandwidth, 3) + " rad/s.");
     }
-    if (!rivals_.front().design.feasible) {
+    if (!baselines_.front().design.feasible) {
       page.text("No PID keeps the rules.");
     } else {
       page.text("Before you change: the best PID would do this by numbers alone: " +
@@ -557,7 +557,7 @@ void Design::show_on(Page& page, const Findings& findings) const {
   }
   if (tuning_) {
     for (const auto& design : tuning_->designs) {
-      if (!design.feasible || design.comes_back) continue;
+      if (!design.feasible || design.recovers) continue;
       page.figure(lost_figure(*tuning_, design));
       break;
     }
@@ -677,9 +677,9 @@ void Design::show_on(Page& page, const Findings& findings) const {
     page.code(pasted_code(pasting_, *tuning_, other, told_),
               "The code for number " + std::to_string(i + 1) + ", " + other.name);
   }
-  for (const auto& rival : rivals_) {
-    if (rival.design.feasible && rival.kind != esokit::RivalKind::given)
-      page.code(rival_program(rival), "The code for the rival " + rival.design.name);
+  for (const auto& baseline : baselines_) {
+    if (baseline.design.feasible && baseline.kind != esokit::PidKind::given)
+      page.code(pid_program(baseline), "The code for " + baseline.design.name);
   }
 }
 

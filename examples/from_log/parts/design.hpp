@@ -8,7 +8,7 @@
 #include <vector>
 
 #include <esokit/analysis/loop.hpp>
-#include <esokit/tune/rivals.hpp>
+#include <esokit/tune/pid_baselines.hpp>
 
 #include "from_log/parts/from_log.hpp"
 #include "from_log/parts/page.hpp"
@@ -33,11 +33,11 @@ class Design {
   [[nodiscard]] const std::string& code() const { return code_; }
   /// The design that was taken.
   [[nodiscard]] const esokit::TunedDesign& taken() const { return tuning_->designs[taken_]; }
-  /// The choice, its model and its rivals.
+  /// The choice, its model and its baselines.
   [[nodiscard]] const esokit::Tuning& tuning() const { return *tuning_; }
   /// The controller as a linear system that is told what the actuator held.
   [[nodiscard]] esokit::LinearController form() const {
-    return esokit::detail::told_of_input(taken().controller);
+    return esokit::detail::given_input_form(taken().controller);
   }
   /// What its code has beside the design.
   [[nodiscard]] const Pasting& pasting() const { return pasting_; }
@@ -57,11 +57,11 @@ class Design {
   std::string why_not_;
   std::vector<Alarm> alarms_;
   Replay replay_;
-  esokit::FitData told_;                    ///< the log as the observer is told of it
-  std::vector<esokit::TunedRival> rivals_;  ///< the best PIDs, and the given one
-  esokit::Migration migration_;             ///< from the given PID
-  esokit::Migration to_best_;               ///< from it to the best PID
-  bool migrates_ = false;                   ///< there is one
+  esokit::FitData told_;                     ///< the log as the observer is told of it
+  std::vector<esokit::TunedPid> baselines_;  ///< the best PIDs, and the given one
+  esokit::Migration migration_;              ///< from the given PID
+  esokit::Migration to_best_;                ///< from it to the best PID
+  bool migrates_ = false;                    ///< there is one
 };
 
 }  // namespace from_log

@@ -13,7 +13,7 @@
 
 #include <esokit/identify/identify.hpp>
 #include <esokit/tune/plain_pid.hpp>
-#include <esokit/tune/problem.hpp>
+#include <esokit/tune/specification.hpp>
 
 #include "common/csv.hpp"
 #include "common/figure.hpp"
@@ -54,7 +54,7 @@ struct Settings {
   /// The PID that the machine has: what changes by going to the design?
   std::optional<esokit::PlainPidConfig> pid{};
   /// What the loop has to keep; the page says of every design whether it comes back.
-  esokit::TuneRules rules{.play = esokit::TunePlay::all};
+  esokit::TuneRules rules{.simulate = esokit::TuneSimulation::all};
   int rank = 1;            ///< which of the designs, the best is 1
   bool anyway = false;     ///< design for a refused log, too
   bool no_design = false;  ///< what was found, and no controller

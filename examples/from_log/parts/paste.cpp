@@ -82,7 +82,7 @@ double checked_w(const Feed& feed, int k) {
   return k < w_moves || k >= w_back ? feed.rest : printed(feed.rest + feed.swing);
 }
 
-/// What the code watches, from the log and from what was played.
+/// What the code watches, from the log and from what was simulated.
 struct Watch {
   double threshold = 0;  ///< a larger innovation is an outlier, unit of y
   double bound = 0;      ///< of dhat, unit of y^(n)
@@ -133,7 +133,7 @@ Watch watch_of(const Tuning& tuning, const TunedDesign& design, const esokit::Fi
   const TuneModel& model = tuning.model;
   const double b0 = model.input_gain.value;
   const double T = model.sample_time;
-  const auto form = esokit::detail::told_of_input(design.controller);
+  const auto form = esokit::detail::given_input_form(design.controller);
   const auto settling = std::min<std::size_t>(
       static_cast<std::size_t>(design.settling_time / T) + 20, rows.y.size() / 4);
   // Gate and monitor look at the innovation of level 1: of a LinearEso with its bandwidth.
@@ -154,16 +154,16 @@ Watch watch_of(const Tuning& tuning, const TunedDesign& design, const esokit::Fi
   double innovation = std::max(quantile(innovations, 0.99), 4.0 * model.noise);
   double load = quantile(loads, 0.99);
   const double middle = std::abs(0.5 * (model.u_min + model.u_max));
-  for (const auto& event : esokit::play_events) {
-    esokit::FitData played;
-    played.sample_time = T;
-    (void)esokit::play(model, 1.0, design.controller, event, design.settling_time,
-                       [&](double, double, double y, double u) {
-                         played.y.push_back(y);
-                         played.u.push_back(u);
-                       });
-    const Replay seen = through(form, b0, model.order, played);
-    for (const double e : innovations_of(played, seen)) {
+  for (const auto& event : esokit::overloads) {
+    esokit::FitData simulated;
+    simulated.sample_time = T;
+    (void)esokit::simulate_overload(model, 1.0, design.controller, event, design.settling_time,
+                                    [&](double, double, double y, double u) {
+                                      simulated.y.push_back(y);
+                                      simulated.u.push_back(u);
+                                    });
+    const Replay seen = through(form, b0, model.order, simulated);
+    for (const double e : innovations_of(simulated, seen)) {
       innovation = std::max(innovation, std::abs(e) + 4.0 * model.noise);
     }
     for (const double l : seen.load) load = std::max(load, std::abs(l) + middle);
@@ -556,7 +556,7 @@ Runner::Profile Runner::profile_of(const Pasting& p, const TuneModel& model, int
 
 Runner::Runner(const Pasting& pasting, const Tuning& tuning, const TunedDesign& design)
     : pasting_(&pasting),
-      form_(esokit::detail::told_of_input(design.controller)),
+      form_(esokit::detail::given_input_form(design.controller)),
       profile_(profile_of(pasting, tuning.model, static_cast<int>(design.settings.gains.size()))),
       feeds_(pasting.feeds.begin(), pasting.feeds.end()),
       lower_(tuning.model.u_min),
@@ -792,7 +792,7 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
     body += wrapped("{.observer = " + gate, "             ", " ");
     body += comment(
         "y: an innovation beyond it is an outlier; twice the largest of the log and "
-        "of the overloads that were played",
+        "of the overloads that were simulated",
         "              ");
     body += "              " + threshold + "},\n";
     body += comment(highest + ": dhat is not believed beyond it; twice the largest, as above",
@@ -803,7 +803,7 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
     body += wrapped(gate, "             ", " ");
     body += comment(
         "y: an innovation beyond it is an outlier; twice the largest of the log and "
-        "of the overloads that were played. dhat has no bound: this observer is not "
+        "of the overloads that were simulated. dhat has no bound: this observer is not "
         "proven with one",
         "              ");
     body += "              " + threshold + "},\n";
@@ -956,17 +956,18 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
   }
   height = std::strtod(number_text(height, 3).c_str(), nullptr);
   const double target = printed(p.start_y + height);
-  const auto played =
+  const auto simulated =
       step_of_code(p, tuning, design, target - p.start_y, checked * T, model.noise, 9);
   std::string samples;
-  for (std::size_t k = 0; k < checked && k < played.y.size(); ++k) {
+  for (std::size_t k = 0; k < checked && k < simulated.y.size(); ++k) {
     char text[80];
-    std::snprintf(text, sizeof text, "{%.9g,%.10g}", played.y[k], played.u[k]);
+    std::snprintf(text, sizeof text, "{%.9g,%.10g}", simulated.y[k], simulated.u[k]);
     samples += (k > 0 ? ", " : "") + std::string(text);
   }
-  body += comment("The first " + std::to_string(checked) +
-                  " samples of a step on the machine that was found, as from_log played it: y with "
-                  "its noise, and u.");
+  body +=
+      comment("The first " + std::to_string(checked) +
+              " samples of a step on the machine that was found, as from_log simulated it: y with "
+              "its noise, and u.");
   body += "constexpr double samples[" + std::to_string(checked) + "][2] = {\n" +
           wrapped(samples + "};", "    ");
   body += "\n" + comment(

@@ -30,7 +30,7 @@ void take_over(const from_log::Outcome& outcome, LogResult& result) {
   };
   const esokit::TunedDesign* taken = choice_of(chosen) >= 0 ? &chosen : nullptr;
   for (const auto& design : tuning.designs) {
-    if (taken == nullptr && choice_of(design) >= 0 && design.comes_back) taken = &design;
+    if (taken == nullptr && choice_of(design) >= 0 && design.recovers) taken = &design;
   }
   if (taken == nullptr) return;
   // Of poles and gains the geometric means; what is over them goes with the sliders.

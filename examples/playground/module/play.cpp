@@ -15,7 +15,7 @@
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/model_eso.hpp>
 #include <esokit/sim/run.hpp>
-#include <esokit/tune/rivals.hpp>
+#include <esokit/tune/pid_baselines.hpp>
 #include <limits>
 #include <memory>
 #include <numbers>

@@ -99,7 +99,7 @@ struct PositionForce {
 };
 
 /// Another order at the bandwidth at which b0 was found.
-struct Rival {
+struct OtherOrder {
   int order = 0;      ///< of 1 to 3, the one that leaves the smallest mean square there; 0: none
   double left = 1.0;  ///< its mean square over that of the identified order
 };
@@ -150,7 +150,7 @@ struct Identified {
   double rise = 0;                 ///< how fast y changes, over what b0 and pole allow (order 1)
   int late_rows = 0;               ///< rows by which u was taken earlier than it was logged
   Lead lead{};                     ///< how early y moves before u, if it does
-  Rival rival{};                   ///< the other order that explains the log best there
+  OtherOrder other_order{};        ///< the other order that explains the log best there
   bool at_once = false;            ///< y follows u within the row, with nothing in between
   int averaged = 1;                ///< rows of the log that were averaged into one
   bool at_bound = false;           ///< a parameter is at a bound of its range at the plateau

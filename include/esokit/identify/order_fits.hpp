@@ -69,8 +69,8 @@ std::vector<OrderFit> fit_orders(const FitData& data, const IdentifyOptions& opt
 /// The other order that leaves least at the bandwidth of `here`, a fit of the order `chosen`. Lag
 /// and pole stand for each other in orders next to each other, so it starts from there, too. Orders
 /// from `lowest` on; one that was not studied, because the order was given, has no friction.
-Rival rival_of(const FitData& data, const std::vector<OrderFit>& orders, int chosen, int extension,
-               const Fit& here, int lowest = 1);
+OtherOrder other_order_of(const FitData& data, const std::vector<OrderFit>& orders, int chosen,
+                          int extension, const Fit& here, int lowest = 1);
 
 /// A log without u where friction holds the machine.
 struct HeldLog {

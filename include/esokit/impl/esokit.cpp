@@ -57,10 +57,10 @@
 #include <esokit/tune/impl/families.ipp>
 #include <esokit/tune/impl/loop_cost.ipp>
 #include <esokit/tune/impl/lqg.ipp>
+#include <esokit/tune/impl/overload.ipp>
+#include <esokit/tune/impl/pid_baselines.ipp>
 #include <esokit/tune/impl/plain_pid.ipp>
-#include <esokit/tune/impl/play.ipp>
-#include <esokit/tune/impl/problem.ipp>
-#include <esokit/tune/impl/rivals.ipp>
+#include <esokit/tune/impl/specification.ipp>
 #include <esokit/tune/impl/tune.ipp>
 #include <esokit/tune/impl/tune_search.ipp>
 #include <esokit/tune/impl/tuning.ipp>

@@ -4,7 +4,7 @@
 
 #include <esokit/core/compiled.hpp>
 #include <esokit/tune/families.hpp>
-#include <esokit/tune/problem.hpp>
+#include <esokit/tune/specification.hpp>
 #include <esokit/tune/tuning.hpp>
 #include <string>
 

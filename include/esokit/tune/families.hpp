@@ -12,7 +12,7 @@
 #include <esokit/gain/pole_set.hpp>
 #include <esokit/model/augmented_model.hpp>
 #include <esokit/tune/lqg.hpp>
-#include <esokit/tune/problem.hpp>
+#include <esokit/tune/specification.hpp>
 #include <functional>
 #include <optional>
 #include <type_traits>

@@ -28,7 +28,7 @@
 #include <esokit/analysis/linear_controller.hpp>
 #include <esokit/analysis/poles.hpp>
 #include <esokit/core/compiled.hpp>
-#include <esokit/tune/problem.hpp>
+#include <esokit/tune/specification.hpp>
 #include <limits>
 #include <vector>
 

@@ -11,7 +11,7 @@
 #include <esokit/analysis/loop.hpp>
 #include <esokit/core/compiled.hpp>
 #include <esokit/math/dense.hpp>
-#include <esokit/tune/problem.hpp>
+#include <esokit/tune/specification.hpp>
 
 namespace esokit {
 

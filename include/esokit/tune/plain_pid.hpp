@@ -1,5 +1,5 @@
 /// @file
-/// A PID as it runs in many machines, to compare with: what `tune_rivals` tunes, as code.
+/// A PID as it runs in many machines, to compare with: what `tune_pids` tunes, as code.
 #pragma once
 
 #include <algorithm>

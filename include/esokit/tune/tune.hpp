@@ -18,8 +18,8 @@
 ///    controller; where a rule binds, that of all divisions that breaks the rules least.
 /// 5. Designs are ranked by J; those within 1 % by the cost of an update, then by the
 ///    modulus margin.
-/// 6. The first is played within the limits of u: if it does not come back from an overload, it
-///    ranks behind and the next is played (tune/play.hpp).
+/// 6. The first is simulated within the limits of u: if it does not recover from an overload, it
+///    ranks behind and the next is simulated (tune/overload.hpp).
 #pragma once
 
 #include <cmath>
@@ -29,8 +29,8 @@
 #include <esokit/tune/families.hpp>
 #include <esokit/tune/loop_cost.hpp>
 #include <esokit/tune/lqg.hpp>
-#include <esokit/tune/play.hpp>
-#include <esokit/tune/problem.hpp>
+#include <esokit/tune/overload.hpp>
+#include <esokit/tune/specification.hpp>
 #include <esokit/tune/tune_search.hpp>
 #include <esokit/tune/tuning.hpp>
 #include <functional>
@@ -53,13 +53,13 @@ StepAnswer step_answer(const DynamicSystem& system, int input, double size, doub
                        double horizon);
 
 /// An event in words.
-std::string in_words(const PlayEvent& event, const TuneModel& model);
+std::string in_words(const Overload& event, const TuneModel& model);
 
-/// Plays all events on all variants of the plant, until one is lost.
-void play_law(TunedDesign& d, const TuneModel& model);
+/// Simulates all events on all variants of the plant, until one is lost.
+void simulate_law(TunedDesign& d, const TuneModel& model);
 
-/// Plays a controller as it is; false if no other way to act at its limits can help.
-bool play_as_is(TunedDesign& d, const TuneModel& model);
+/// Simulates a controller as it is; false if no other way to act at its limits can help.
+bool simulate_as_is(TunedDesign& d, const TuneModel& model);
 
 /// What the loop of a design does, and the rule that limits it.
 /// @param kept what it keeps of the rules, from its LoopNumbers and the damping of its poles
@@ -68,7 +68,7 @@ void fill_in_loop(TunedDesign& d, const TuneSearch& search, LoopNumbers numbers,
                   double optimum, double free_cost);
 
 /// By J; among the remaining designs within 1 % of the smallest J, the cheapest update comes next.
-/// Behind is what has to be softened beyond order 2, then what does not come back, last what does
+/// Behind is what has to be softened beyond order 2, then what does not recover, last what does
 /// not keep the rules.
 void rank(std::vector<TunedDesign>& designs, int order);
 
@@ -92,7 +92,7 @@ double bandwidth_for(const Function& rises, double wanted, double low, double hi
 /// @return error for a model that `validate` refuses, more than one requirement, or a requirement
 ///         that no controller can meet
 [[nodiscard]] Expected<Tuning, Error<double>> tune(const TuneModel& given,
-                                                   const TuneWish& wish = {},
+                                                   const TuneSpecification& specification = {},
                                                    const TuneRules& rules = {});
 
 }  // namespace esokit

@@ -9,8 +9,8 @@
 #include <esokit/tune/families.hpp>
 #include <esokit/tune/loop_cost.hpp>
 #include <esokit/tune/lqg.hpp>
-#include <esokit/tune/problem.hpp>
 #include <esokit/tune/search.hpp>
+#include <esokit/tune/specification.hpp>
 #include <esokit/tune/tuning.hpp>
 #include <limits>
 #include <map>

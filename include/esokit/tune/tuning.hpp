@@ -6,8 +6,8 @@
 #include <esokit/core/compiled.hpp>
 #include <esokit/tune/families.hpp>
 #include <esokit/tune/loop_cost.hpp>
-#include <esokit/tune/play.hpp>
-#include <esokit/tune/problem.hpp>
+#include <esokit/tune/overload.hpp>
+#include <esokit/tune/specification.hpp>
 #include <string>
 #include <vector>
 
@@ -19,16 +19,16 @@ struct TunedDesign {
   TuneFamily family{};      ///< how its gains are chosen
   int extension = 1;        ///< m
   int levels = 1;           ///< p
-  int numbers = 0;          ///< how many were chosen for J; what the model tells does not count
+  int numbers = 0;          ///< how many were chosen for J; what the model gives does not count
   TuneKnowledge knows{};    ///< what its observer knows
   TuneSettings settings{};  ///< the chosen parameters
-  bool feasible = false;    ///< keeps all rules: margins, noise in u, and what lets it come back
+  bool feasible = false;    ///< keeps all rules: margins, noise in u, and what lets it recover
   std::string constraint;   ///< the rule that limits it, or that it cannot keep; or "none"
-  bool played = false;      ///< within the limits, see TuneRules::play
-  bool comes_back = true;   ///< from all that was played; true if nothing was
-  std::string lost;         ///< in words, what it does not come back from
-  PlayEvent lost_in{};      ///< this event, on variant `lost_on` of the plant
-  int lost_on = 0;          ///< see played_variants
+  bool simulated = false;   ///< within the limits, see TuneRules::simulate
+  bool recovers = true;     ///< from all that was simulated; true if nothing was
+  std::string lost;         ///< in words, what it does not recover from
+  Overload lost_in{};       ///< this event, on variant `lost_on` of the plant
+  int lost_on = 0;          ///< see simulated_variants
   double cost = 0.0;        ///< J
   double excess = 0.0;      ///< sqrt(J / J*)
   double free_excess =
@@ -48,13 +48,16 @@ struct TunedDesign {
   int operations = 0;              ///< per update of the observer, see update_operations
   std::string code;                ///< C++ source of the controller, type and config, to paste
   LinearController controller{};   ///< for the analysis, see closed_loop(model, controller)
-  PlayedLaw law{};                 ///< what softening has to know, see `played_law`
+  SofteningLaw law{};              ///< what softening has to know, see `softening_law`
 
-  /// The law for `play`: none, that is the linear one, unless it softens at the limits.
-  [[nodiscard]] PlayedLaw played_law() const { return settings.soften ? law : PlayedLaw{}; }
-  /// The settling time for `play` on one of `played_variants`, s: with friction 32 / omega_c of a
-  /// law.
-  [[nodiscard]] double played_settling(const TuneModel& variant) const;
+  /// The law for `simulate_overload`: none, that is the linear one, unless it softens at the
+  /// limits.
+  [[nodiscard]] SofteningLaw softening_law() const {
+    return settings.soften ? law : SofteningLaw{};
+  }
+  /// The settling time for `simulate_overload` on one of `simulated_variants`, s: with friction 32
+  /// / omega_c of a law.
+  [[nodiscard]] double simulated_settling(const TuneModel& variant) const;
 };
 
 /// The result of `tune`.
@@ -68,10 +71,10 @@ struct Tuning {
   double least_noise = 0.0;    ///< what cancelling the given disturbance alone needs, unit of u
   double optimum = 0.0;        ///< J*
   LoopNumbers lqg{};           ///< of the controller with J*
-  std::vector<TunedDesign> designs{};  ///< the best one first, then what does not come back when
-                                       ///< played, infeasible ones last
+  std::vector<TunedDesign> designs{};  ///< the best one first, then what does not recover when
+                                       ///< simulated, infeasible ones last
 
-  /// The first design, or null if it does not keep the rules or does not come back.
+  /// The first design, or null if it does not keep the rules or does not recover.
   [[nodiscard]] const TunedDesign* chosen() const noexcept;
 };
 
@@ -83,7 +86,7 @@ struct TuneAlarm {
 
 /// What speaks against a design that keeps its rules: a settling time above the one asked, noise in
 /// u above usual_control_noise, more than three times the deviations of the best linear controller,
-/// and what it does not come back from, or that nothing was played.
+/// and what it does not recover from, or that nothing was simulated.
 std::vector<TuneAlarm> alarms(const Tuning& tuning, const TunedDesign& design);
 
 /// Operations of an update of the observer: additions, products, comparisons and the like in its

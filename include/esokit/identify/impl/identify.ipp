@@ -160,8 +160,8 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
   if (result.plateau.middle > 0) {
     // A column of y would show order 1 the y that it has to predict.
     const int lowest = position || known > 0 ? 2 : 1;
-    result.rival = rival_of(rows, orders, model.order, model.extension,
-                            result.plateau.points[result.plateau.middle].fit, lowest);
+    result.other_order = other_order_of(rows, orders, model.order, model.extension,
+                                        result.plateau.points[result.plateau.middle].fit, lowest);
   }
   // When exactly the machine stands is known to some rows only: so times are those of all rows.
   const Plateau of_all = result.plateau;
@@ -625,7 +625,7 @@ ESOKIT_FUNCTION Check<double> judge(const Identified& found, const Log& log,
                "not told from the rest; record several steps that last until y settles, or a "
                "sweep");
   rules.demand(
-      !(found.rival.left < 1.0 / std::numbers::e), "order", static_cast<double>(found.order),
+      !(found.other_order.left < 1.0 / std::numbers::e), "order", static_cast<double>(found.order),
       "is the order, but where b0 was found another one leaves less than 1 / e of the mean square: "
       "give that one, or a y of this one (a position under a motor has order 2, a speed 1)");
   if (!rules) return rules;

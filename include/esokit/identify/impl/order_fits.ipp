@@ -285,13 +285,13 @@ ESOKIT_FUNCTION std::vector<OrderFit>::const_iterator best_order(
   return slower->slower < likely->slower - 1.0 && !is_part_of(*slower, *likely) ? slower : likely;
 }
 
-ESOKIT_FUNCTION Rival rival_of(const FitData& data, const std::vector<OrderFit>& orders, int chosen,
-                               int extension, const Fit& here, int lowest) {
+ESOKIT_FUNCTION OtherOrder other_order_of(const FitData& data, const std::vector<OrderFit>& orders,
+                                          int chosen, int extension, const Fit& here, int lowest) {
   const auto of = [&](int order) {
     return std::find_if(orders.begin(), orders.end(),
                         [order](const OrderFit& fit) { return fit.model.order == order; });
   };
-  Rival rival;
+  OtherOrder found;
   for (int order = lowest; order <= 3; ++order) {
     if (order == chosen) continue;
     const bool studied = of(order) != orders.end();
@@ -314,10 +314,10 @@ ESOKIT_FUNCTION Rival rival_of(const FitData& data, const std::vector<OrderFit>&
     }
     for (const FitPoint& start : {own, exchanged}) {
       const double left = fit.minimise(start, false, 8).mean_square / here.mean_square;
-      if (rival.order == 0 || left < rival.left) rival = {other.model.order, left};
+      if (found.order == 0 || left < found.left) found = {other.model.order, left};
     }
   }
-  return rival;
+  return found;
 }
 
 /// Largest share of the rows at standstill: of more, too little motion is left, or a coarse encoder

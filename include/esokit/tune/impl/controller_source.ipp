@@ -6,7 +6,7 @@
 #include <cstdlib>
 #include <esokit/tune/controller_source.hpp>
 #include <esokit/tune/families.hpp>
-#include <esokit/tune/problem.hpp>
+#include <esokit/tune/specification.hpp>
 #include <esokit/tune/tuning.hpp>
 #include <string>
 #include <vector>

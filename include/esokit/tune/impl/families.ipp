@@ -12,7 +12,7 @@
 #include <esokit/model/augmented_model.hpp>
 #include <esokit/tune/families.hpp>
 #include <esokit/tune/lqg.hpp>
-#include <esokit/tune/problem.hpp>
+#include <esokit/tune/specification.hpp>
 #include <optional>
 #include <vector>
 

@@ -9,7 +9,7 @@
 #include <esokit/analysis/linear_controller.hpp>
 #include <esokit/analysis/poles.hpp>
 #include <esokit/tune/loop_cost.hpp>
-#include <esokit/tune/problem.hpp>
+#include <esokit/tune/specification.hpp>
 #include <limits>
 #include <numbers>
 #include <utility>

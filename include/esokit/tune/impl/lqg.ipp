@@ -6,7 +6,7 @@
 #include <esokit/analysis/loop.hpp>
 #include <esokit/math/dense.hpp>
 #include <esokit/tune/lqg.hpp>
-#include <esokit/tune/problem.hpp>
+#include <esokit/tune/specification.hpp>
 
 namespace esokit {
 

@@ -10,8 +10,8 @@
 #include <esokit/tune/impl/families.ipp>
 #include <esokit/tune/loop_cost.hpp>
 #include <esokit/tune/lqg.hpp>
-#include <esokit/tune/play.hpp>
-#include <esokit/tune/problem.hpp>
+#include <esokit/tune/overload.hpp>
+#include <esokit/tune/specification.hpp>
 #include <esokit/tune/tune.hpp>
 #include <esokit/tune/tune_search.hpp>
 #include <esokit/tune/tuning.hpp>
@@ -61,7 +61,7 @@ ESOKIT_FUNCTION StepAnswer step_answer(const DynamicSystem& system, int input, d
   return answer;
 }
 
-ESOKIT_FUNCTION std::string in_words(const PlayEvent& event, const TuneModel& model) {
+ESOKIT_FUNCTION std::string in_words(const Overload& event, const TuneModel& model) {
   const auto number = [](double value) {
     char text[32];
     std::snprintf(text, sizeof text, "%.3g", value);
@@ -71,27 +71,27 @@ ESOKIT_FUNCTION std::string in_words(const PlayEvent& event, const TuneModel& mo
   const double seconds = event.latencies * model.latency();
   const std::string time = seconds < 1.0 ? number(1e3 * seconds) + " ms" : number(seconds) + " s";
   switch (event.kind) {
-    case PlayKind::load:
+    case OverloadKind::load:
       return "a load of " + share + " for " + time;
-    case PlayKind::kick:
+    case OverloadKind::kick:
       return "a kick worth " + share + " for " + time;
     default:
       return "a step of the reference as far as " + share + " moves the chain in " + time;
   }
 }
 
-ESOKIT_FUNCTION void play_law(TunedDesign& d, const TuneModel& model) {
-  d.comes_back = true;
+ESOKIT_FUNCTION void simulate_law(TunedDesign& d, const TuneModel& model) {
+  d.recovers = true;
   d.lost.clear();
-  const PlayedLaw law = d.played_law();
-  const auto variants = played_variants(model);
+  const SofteningLaw law = d.softening_law();
+  const auto variants = simulated_variants(model);
   for (std::size_t v = 0; v < variants.size(); ++v) {
-    for (const PlayEvent& event : played_events(variants[v].model)) {
-      const Played played = play(
+    for (const Overload& event : overloads_of(variants[v].model)) {
+      const OverloadOutcome outcome = simulate_overload(
           variants[v].model, variants[v].gain, d.controller, event,
-          d.played_settling(variants[v].model), [](double, double, double, double) {}, law);
-      if (played.back || !played.counts) continue;
-      d.comes_back = false;
+          d.simulated_settling(variants[v].model), [](double, double, double, double) {}, law);
+      if (outcome.back || !outcome.counts) continue;
+      d.recovers = false;
       d.lost_in = event;
       d.lost_on = static_cast<int>(v);
       d.lost = in_words(event, model) +
@@ -104,28 +104,28 @@ ESOKIT_FUNCTION void play_law(TunedDesign& d, const TuneModel& model) {
   }
 }
 
-ESOKIT_FUNCTION bool play_as_is(TunedDesign& d, const TuneModel& model) {
-  d.played = true;
-  if (model.may_rub() && swings_with_friction(model, d.controller)) {
-    d.comes_back = false;
-    d.lost_in = friction_events[0];
-    d.lost_on = static_cast<int>(played_variants(model).size()) - 1;
-    d.lost = "friction on y'', however small: it acts as a damping, with which the loop swings";
+ESOKIT_FUNCTION bool simulate_as_is(TunedDesign& d, const TuneModel& model) {
+  d.simulated = true;
+  if (model.may_rub() && oscillates_with_friction(model, d.controller)) {
+    d.recovers = false;
+    d.lost_in = friction_overloads[0];
+    d.lost_on = static_cast<int>(simulated_variants(model).size()) - 1;
+    d.lost = "friction on y'', however small: it acts as a damping, with which the loop oscillates";
     return false;
   }
-  play_law(d, model);
+  simulate_law(d, model);
   return true;
 }
 
-/// Plays a design; one of order 2 softened, and as designed if it does not come back so, the others
-/// the other way round. Drawn machines behind friction and gravity came back from more and sooner
-/// like this (examples/choosing).
-inline void play_all(TunedDesign& d, const TuneModel& model) {
+/// Simulates a design; one of order 2 softened, and as designed if it does not recover so, the
+/// others the other way round. Random plants behind friction and gravity recovered from more and
+/// sooner like this (examples/choosing).
+inline void simulate_all(TunedDesign& d, const TuneModel& model) {
   const bool possible = d.settings.gains[0] > 0.0;
   d.settings.soften = model.order == 2 && possible;
-  if (!play_as_is(d, model) || d.comes_back || !possible) return;
+  if (!simulate_as_is(d, model) || d.recovers || !possible) return;
   d.settings.soften = !d.settings.soften;
-  play_law(d, model);
+  simulate_law(d, model);
 }
 
 ESOKIT_FUNCTION void fill_in_loop(
@@ -205,7 +205,10 @@ inline void fill_in(Contender& c, const TuneSearch& search, const LoopCost& fine
 
 ESOKIT_FUNCTION void rank(std::vector<TunedDesign>& designs, int order) {
   const auto group = [&](const TunedDesign& d) {
-    return !d.feasible ? 3 : !d.comes_back ? 2 : order > 2 && d.played && d.settings.soften ? 1 : 0;
+    return !d.feasible                                     ? 3
+           : !d.recovers                                   ? 2
+           : order > 2 && d.simulated && d.settings.soften ? 1
+                                                           : 0;
   };
   std::stable_sort(designs.begin(), designs.end(), [&](const TunedDesign& a, const TunedDesign& b) {
     return group(a) != group(b) ? group(a) < group(b) : a.cost < b.cost;
@@ -302,18 +305,20 @@ ESOKIT_FUNCTION std::vector<Contender> contenders(const TuneModel& model, bool l
 
 }  // namespace detail
 
-ESOKIT_FUNCTION Expected<Tuning, Error<double>> tune(const TuneModel& given, const TuneWish& wish,
+ESOKIT_FUNCTION Expected<Tuning, Error<double>> tune(const TuneModel& given,
+                                                     const TuneSpecification& specification,
                                                      const TuneRules& rules) {
   Rules<double> checks;
   checks.all_of(given.validate())
-      .not_negative("control_noise", wish.control_noise)
-      .not_negative("settling_time", wish.settling_time)
-      .not_negative("controller_bandwidth", wish.controller_bandwidth)
-      .demand(!(wish.settling_time > 0.0 && wish.control_noise > 0.0), "settling_time",
-              wish.settling_time, "must be left out if control_noise is given")
-      .demand(!(wish.controller_bandwidth > 0.0 &&
-                (wish.control_noise > 0.0 || wish.settling_time > 0.0)),
-              "controller_bandwidth", wish.controller_bandwidth,
+      .not_negative("control_noise", specification.control_noise)
+      .not_negative("settling_time", specification.settling_time)
+      .not_negative("controller_bandwidth", specification.controller_bandwidth)
+      .demand(!(specification.settling_time > 0.0 && specification.control_noise > 0.0),
+              "settling_time", specification.settling_time,
+              "must be left out if control_noise is given")
+      .demand(!(specification.controller_bandwidth > 0.0 &&
+                (specification.control_noise > 0.0 || specification.settling_time > 0.0)),
+              "controller_bandwidth", specification.controller_bandwidth,
               "must be left out if control_noise or settling_time is given")
       .not_negative("modulus_margin", rules.modulus_margin)
       .demand(!(rules.modulus_margin >= 1.0), "modulus_margin", rules.modulus_margin,
@@ -350,8 +355,8 @@ ESOKIT_FUNCTION Expected<Tuning, Error<double>> tune(const TuneModel& given, con
     return numbers.stable ? numbers.control_noise : 0.0;
   };
   tuning.least_noise = least_noise(given);
-  const double wanted = wish.control_noise > 0.0
-                            ? wish.control_noise
+  const double wanted = specification.control_noise > 0.0
+                            ? specification.control_noise
                             : usual_control_noise * (given.u_max - given.u_min);
   TuneModel model = given;
   const double floor =
@@ -388,39 +393,40 @@ ESOKIT_FUNCTION Expected<Tuning, Error<double>> tune(const TuneModel& given, con
   const double delay = model.lag + model.dead_time + model.sensor;
   const double settled = std::array{3.912, 5.834, 7.517}[static_cast<std::size_t>(n - 1)];
   double w = 0.0;
-  if (wish.controller_bandwidth > 0.0) {
-    w = wish.controller_bandwidth;
+  if (specification.controller_bandwidth > 0.0) {
+    w = specification.controller_bandwidth;
     checks
         .demand(detail::at_most(w, fast),
                 {"controller_bandwidth", w, "must not be above half the sample rate, which is", -1,
                  fast, true})
         .demand(detail::at_most(1e-6, w * T), "controller_bandwidth", w,
                 "must be at least 1e-6 of the sample rate")
-        .demand(detail::at_most(w, 2.0 * damped),
-                {"controller_bandwidth", w,
-                 "is so fast for this latency that the loop would swing at its limits for ever; "
-                 "must be at most",
-                 -1, 2.0 * damped, true});
-  } else if (wish.settling_time > 0.0) {
+        .demand(detail::at_most(w, 2.0 * damped), {"controller_bandwidth", w,
+                                                   "is so fast for this latency that the loop "
+                                                   "would oscillate between its limits for ever; "
+                                                   "must be at most",
+                                                   -1, 2.0 * damped, true});
+  } else if (specification.settling_time > 0.0) {
     // Of n equal poles w, after the time that u and y need.
     const auto shortest = [&](double x) { return delay + settled / x; };
     const double safe = (std::min)(fast, 2.0 * damped);
     checks
         .demand(
-            detail::at_most(shortest(fast), wish.settling_time),
-            {"settling_time", wish.settling_time,
+            detail::at_most(shortest(fast), specification.settling_time),
+            {"settling_time", specification.settling_time,
              "is shorter than sample time and dead time allow, which is", -1, shortest(fast), true})
-        .demand(detail::at_most(shortest(safe), wish.settling_time),
-                {"settling_time", wish.settling_time,
-                 "is so short for this latency that the loop would swing at its limits for ever; "
+        .demand(detail::at_most(shortest(safe), specification.settling_time),
+                {"settling_time", specification.settling_time,
+                 "is so short for this latency that the loop would oscillate between its limits "
+                 "for ever; "
                  "must be at least",
                  -1, shortest(safe), true})
-        .demand(detail::at_most(wish.settling_time, shortest(slow)),
-                {"settling_time", wish.settling_time,
+        .demand(detail::at_most(specification.settling_time, shortest(slow)),
+                {"settling_time", specification.settling_time,
                  "is far slower than the disturbance; must be at most", -1, shortest(slow), true});
     if (!checks) return checks.error();
-    tuning.settling_time = wish.settling_time;
-    w = settled / (wish.settling_time - delay);
+    tuning.settling_time = specification.settling_time;
+    w = settled / (specification.settling_time - delay);
   } else {
     checks.demand(
         wanted > 1.001 * tuning.least_noise,
@@ -434,7 +440,8 @@ ESOKIT_FUNCTION Expected<Tuning, Error<double>> tune(const TuneModel& given, con
   }
   if (!checks) return checks.error();
   // Of order 3 equal poles seldom keep the rules: there the law is searched for, at its rho.
-  const bool given_law = wish.controller_bandwidth > 0.0 || (wish.settling_time > 0.0 && n < 3);
+  const bool given_law =
+      specification.controller_bandwidth > 0.0 || (specification.settling_time > 0.0 && n < 3);
   // What the lag adds to the settling time depends on the design.
   for (int corrections = 0;; ++corrections) {
     tuning.rho = rho_of(w);
@@ -505,24 +512,25 @@ ESOKIT_FUNCTION Expected<Tuning, Error<double>> tune(const TuneModel& given, con
     }
     tuning.designs.clear();
     for (detail::Contender& c : all) tuning.designs.push_back(std::move(c.design));
-    if (rules.play == TunePlay::all) {
+    if (rules.simulate == TuneSimulation::all) {
       for (TunedDesign& design : tuning.designs) {
-        if (design.feasible) detail::play_all(design, model);
+        if (design.feasible) detail::simulate_all(design, model);
       }
     }
     for (bool again = true; again;) {
       detail::rank(tuning.designs, n);
       TunedDesign& first = tuning.designs.front();
-      again = rules.play == TunePlay::first && first.feasible && !first.played;
-      if (again) detail::play_all(first, model);
+      again = rules.simulate == TuneSimulation::first && first.feasible && !first.simulated;
+      if (again) detail::simulate_all(first, model);
     }
     const TunedDesign* chosen = tuning.chosen();
-    if (!(wish.settling_time > 0.0) || chosen == nullptr || corrections == (given_law ? 4 : 2) ||
-        (std::abs)(chosen->settling_time - wish.settling_time) <=
-            (std::max)(0.02 * wish.settling_time, T)) {
+    if (!(specification.settling_time > 0.0) || chosen == nullptr ||
+        corrections == (given_law ? 4 : 2) ||
+        (std::abs)(chosen->settling_time - specification.settling_time) <=
+            (std::max)(0.02 * specification.settling_time, T)) {
       break;
     }
-    w = std::clamp(w * chosen->settling_time / wish.settling_time, slow,
+    w = std::clamp(w * chosen->settling_time / specification.settling_time, slow,
                    (std::min)(fast, 2.0 * damped));
   }
   for (TunedDesign& design : tuning.designs) {

@@ -8,8 +8,8 @@
 #include <esokit/tune/families.hpp>
 #include <esokit/tune/loop_cost.hpp>
 #include <esokit/tune/lqg.hpp>
-#include <esokit/tune/problem.hpp>
 #include <esokit/tune/search.hpp>
+#include <esokit/tune/specification.hpp>
 #include <esokit/tune/tune_search.hpp>
 #include <esokit/tune/tuning.hpp>
 #include <limits>
@@ -141,7 +141,7 @@ ESOKIT_FUNCTION double TuneSearch::value(const Contender& c, const std::vector<d
     outside += (std::max)(low(c, i) - x[i], 0.0) + (std::max)(x[i] - high(c, i), 0.0);
   }
   if (outside > 0.0) return 1e4 * (1.0 + outside);
-  // The search with rules comes back to the points of that without.
+  // The search with rules returns to the points of that without.
   auto [at, added] = seen.try_emplace(x);
   Seen& found = at->second;
   if (!added) return found.value + price * found.lack - worth_of_speed * found.speed;
@@ -156,7 +156,7 @@ ESOKIT_FUNCTION double TuneSearch::value(const Contender& c, const std::vector<d
   if (!numbers.stable || !(j > 0.0) || !is_finite(j)) {
     found.value = 1e4;
   } else {
-    // Behind limits a slow law comes back more often, except of one integrator.
+    // Behind limits a slow law recovers more often, except of one integrator.
     const auto& k = chosen.gains;
     const double poles = damped ? damping_of(*controller, c.design.knows.sinusoid) : any;
     found = {std::log(j), lack(kept(c, chosen, numbers, poles), 1.004),

@@ -5,24 +5,23 @@
 #include <esokit/analysis/controllers.hpp>
 #include <esokit/tune/families.hpp>
 #include <esokit/tune/loop_cost.hpp>
-#include <esokit/tune/play.hpp>
-#include <esokit/tune/problem.hpp>
+#include <esokit/tune/overload.hpp>
+#include <esokit/tune/specification.hpp>
 #include <esokit/tune/tuning.hpp>
 #include <string>
 #include <vector>
 
 namespace esokit {
 
-ESOKIT_FUNCTION double TunedDesign::played_settling(const TuneModel& variant) const {
+ESOKIT_FUNCTION double TunedDesign::simulated_settling(const TuneModel& variant) const {
   return variant.friction.value_or(0.0) > 0.0 && !settings.gains.empty()
              ? 32.0 / detail::law_mean(settings.gains, variant.order)
              : settling_time;
 }
 
 ESOKIT_FUNCTION const TunedDesign* Tuning::chosen() const noexcept {
-  return !designs.empty() && designs.front().feasible && designs.front().comes_back
-             ? &designs.front()
-             : nullptr;
+  return !designs.empty() && designs.front().feasible && designs.front().recovers ? &designs.front()
+                                                                                  : nullptr;
 }
 
 ESOKIT_FUNCTION std::vector<TuneAlarm> alarms(const Tuning& tuning, const TunedDesign& design) {
@@ -33,14 +32,14 @@ ESOKIT_FUNCTION std::vector<TuneAlarm> alarms(const Tuning& tuning, const TunedD
     std::snprintf(text, sizeof text, "%.3g", value);
     return std::string(text);
   };
-  if (!design.comes_back) {
-    all.push_back(
-        {"overload", "This design does not come back from " + design.lost +
-                         ": u goes from limit to limit or stays at one, or y swings for ever."});
-  } else if (!design.played) {
+  if (!design.recovers) {
     all.push_back({"overload",
-                   "This design was not played within the limits of u: whether it "
-                   "comes back from an overload is not known."});
+                   "This design does not recover from " + design.lost +
+                       ": u goes from limit to limit or stays at one, or y oscillates for ever."});
+  } else if (!design.simulated) {
+    all.push_back({"overload",
+                   "This design was not simulated within the limits of u: whether it "
+                   "recovers from an overload is not known."});
   }
   if (tuning.settling_time > 0.0 && design.settling_time > 1.05 * tuning.settling_time) {
     all.push_back(

@@ -47,7 +47,7 @@ struct TuneModel {
   }
 
   /// Order 3: Coulomb friction on y'', unit of y''; 0: none. Left out: not known, and the design is
-  /// played with up to a quarter of what half the range of u makes of y'' in ten latencies.
+  /// simulated with up to a quarter of what half the range of u makes of y'' in ten latencies.
   std::optional<double> friction{};
 
   /// (q / (N^2 T))^(1 / (2 n + 2)): the bandwidth of a Kalman filter for the chain, rad/s.
@@ -92,7 +92,7 @@ TuneModel tune_model(const Identified& found, double u_min, double u_max);
 inline constexpr double usual_control_noise = 0.05;
 
 /// The requirement. Give at most one of these.
-struct TuneWish {
+struct TuneSpecification {
   /// Standard deviation of u that the measurement noise may cause, unit of u. If nothing is given:
   /// usual_control_noise of u_max - u_min.
   double control_noise = 0.0;
@@ -104,17 +104,17 @@ struct TuneWish {
       0.0;  ///< omega_c, rad/s: the law is given, only the observer is chosen
 };
 
-/// Which designs are played within the limits of u, see tune/play.hpp.
-enum class TunePlay : unsigned char {
+/// Which designs are simulated within the limits of u, see tune/overload.hpp.
+enum class TuneSimulation : unsigned char {
   none,   ///< no design
-  first,  ///< in the order of the ranking, until one comes back: that one is recommended
+  first,  ///< in the order of the ranking, until one recovers: that one is recommended
   all     ///< every design that keeps the rules: longer by a quarter
 };
 
 /// TuneRules::filter_floor of orders 1 to 3: with it load steps mostly move y less than with a PID
-/// of the SIMC rule (85 to 100 of 100 drawn machines). Falls with the order: a loop around one
+/// of the SIMC rule (85 to 100 of 100 random plants). Falls with the order: a loop around one
 /// integrator is stable at any low gain; around two or three, the faster it is, the less saturation
-/// it comes back from.
+/// it recovers from.
 inline constexpr std::array<double, 3> usual_filter_floor{0.7, 0.4, 0.2};
 
 /// What a loop has to keep. Margins: for the nominal model, and with b0 at both ends of its
@@ -144,7 +144,7 @@ struct TuneRules {
   /// control noise allows: a log without disturbances does not show the loads of tomorrow. Left
   /// out: usual_filter_floor of the order; 0: none.
   std::optional<double> filter_floor{};
-  TunePlay play = TunePlay::first;  ///< what does not come back ranks behind
+  TuneSimulation simulate = TuneSimulation::first;  ///< what does not recover ranks behind
 };
 
 namespace detail {
@@ -172,5 +172,5 @@ LoopResult closed_loop(const TuneModel& model, const LinearController& controlle
 }  // namespace esokit
 
 #if defined(ESOKIT_HEADER_ONLY)
-#include <esokit/tune/impl/problem.ipp>
+#include <esokit/tune/impl/specification.ipp>
 #endif

@@ -6,9 +6,9 @@
 #include <complex>
 #include <cstddef>
 #include <cstdio>
+#include <esokit/tune/pid_baselines.hpp>
 #include <esokit/tune/pid_conversion.hpp>
 #include <esokit/tune/plain_pid.hpp>
-#include <esokit/tune/rivals.hpp>
 #include <esokit/tune/tune.hpp>
 #include <limits>
 #include <string>
@@ -70,7 +70,7 @@ ESOKIT_FUNCTION LinearController pid_form(const PlainPidConfig& pid) {
   return c;
 }
 
-ESOKIT_FUNCTION RivalSearch::RivalSearch(const Tuning& of)
+ESOKIT_FUNCTION PidSearch::PidSearch(const Tuning& of)
     : tuning(&of),
       search(search_for(of, false)),
       coarse(search.coarse()),
@@ -84,8 +84,8 @@ ESOKIT_FUNCTION RivalSearch::RivalSearch(const Tuning& of)
   }
 }
 
-ESOKIT_FUNCTION PlainPidConfig RivalSearch::settings(RivalKind kind,
-                                                     const std::vector<double>& x) const {
+ESOKIT_FUNCTION PlainPidConfig PidSearch::settings(PidKind kind,
+                                                   const std::vector<double>& x) const {
   const TuneModel& model = tuning->model;
   PlainPidConfig pid;
   pid.sample_time = model.sample_time;
@@ -93,19 +93,19 @@ ESOKIT_FUNCTION PlainPidConfig RivalSearch::settings(RivalKind kind,
   pid.upper = model.u_max;
   pid.proportional = std::copysign(gain * std::exp(power * x[0]), model.input_gain.value);
   pid.integral = pid.proportional * std::exp(x[1]);
-  if (kind == RivalKind::pi) return pid;
+  if (kind == PidKind::pi) return pid;
   pid.derivative = pid.proportional * std::exp(-x[2]);
-  if (kind == RivalKind::derivative) {
+  if (kind == PidKind::derivative) {
     pid.derivative_filter = std::exp(-x[3]);
   } else {
     pid.filter_frequency = std::exp(x[3]);
-    if (kind == RivalKind::freely_filtered) pid.filter_damping = std::exp(x[4]);
+    if (kind == PidKind::freely_filtered) pid.filter_damping = std::exp(x[4]);
   }
   return pid;
 }
 
-ESOKIT_FUNCTION double RivalSearch::value(RivalKind kind, const std::vector<double>& x,
-                                          double price) const {
+ESOKIT_FUNCTION double PidSearch::value(PidKind kind, const std::vector<double>& x,
+                                        double price) const {
   const double slow = std::log(search.slowest()), fast = std::log(search.fastest());
   // A PID with a small or large part is one without this part.
   const std::array<double, 5> low{slow - 2.0, slow - 6.0, slow - 3.0, slow, std::log(0.001)};
@@ -122,13 +122,13 @@ ESOKIT_FUNCTION double RivalSearch::value(RivalKind kind, const std::vector<doub
   return std::log(j) + price * TuneSearch::lack(search.kept(numbers, poles), 1.004);
 }
 
-ESOKIT_FUNCTION double RivalSearch::lack(RivalKind kind, const std::vector<double>& x) const {
+ESOKIT_FUNCTION double PidSearch::lack(PidKind kind, const std::vector<double>& x) const {
   const LinearController form = pid_form(settings(kind, x));
   return TuneSearch::lack(
       search.kept((*cost)(closed_upon_itself(form)), search.damping_of(form, false)), 0.9995);
 }
 
-ESOKIT_FUNCTION std::vector<double> RivalSearch::equal_to(const LinearController& c) const {
+ESOKIT_FUNCTION std::vector<double> PidSearch::equal_to(const LinearController& c) const {
   if (c.states() != 3) return {};
   const double T = tuning->model.sample_time;
   auto poles = poles_of(c.a);
@@ -162,8 +162,8 @@ ESOKIT_FUNCTION std::vector<double> RivalSearch::equal_to(const LinearController
           std::log(right(0, 0) / right(2, 0)), std::log(w), std::log(damping)};
 }
 
-ESOKIT_FUNCTION std::vector<std::vector<double>> RivalSearch::starts(
-    RivalKind kind, const std::vector<std::vector<double>>& more) const {
+ESOKIT_FUNCTION std::vector<std::vector<double>> PidSearch::starts(
+    PidKind kind, const std::vector<std::vector<double>>& more) const {
   std::vector<SearchPoint> all;
   const auto n = static_cast<std::size_t>(numbers(kind));
   const auto take = [&](std::vector<double> x) {
@@ -180,9 +180,9 @@ ESOKIT_FUNCTION std::vector<std::vector<double>> RivalSearch::starts(
           const double w = share * w0;
           take({std::log(w), std::log(w / of_integral), std::log(w * of_derivative),
                 std::log(w * of_filter), std::log(0.8)});
-          if (kind == RivalKind::pi) break;
+          if (kind == PidKind::pi) break;
         }
-        if (kind == RivalKind::pi) break;
+        if (kind == PidKind::pi) break;
       }
     }
   }
@@ -200,8 +200,8 @@ ESOKIT_FUNCTION std::vector<std::vector<double>> RivalSearch::starts(
   return best;
 }
 
-ESOKIT_FUNCTION SearchPoint RivalSearch::least(
-    RivalKind kind, bool rules, const std::vector<std::vector<double>>& starts) const {
+ESOKIT_FUNCTION SearchPoint PidSearch::least(PidKind kind, bool rules,
+                                             const std::vector<std::vector<double>>& starts) const {
   SearchPoint best;
   best.value = std::numeric_limits<double>::infinity();
   const auto n = static_cast<std::size_t>(numbers(kind));
@@ -255,20 +255,20 @@ ESOKIT_FUNCTION PlainPidConfig as_printed(PlainPidConfig pid) {
   return pid;
 }
 
-ESOKIT_FUNCTION void judge(TunedRival& rival, const TuneSearch& search, const LoopCost& fine,
+ESOKIT_FUNCTION void judge(TunedPid& baseline, const TuneSearch& search, const LoopCost& fine,
                            double optimum, double free_cost, bool chosen) {
-  TunedDesign& d = rival.design;
+  TunedDesign& d = baseline.design;
   const TuneModel& model = search.model;
-  rival.pid = as_printed(rival.pid);
-  const double ti = rival.pid.integral_time(), td = rival.pid.derivative_time();
-  std::vector<double> times{rival.pid.tracking_time};
+  baseline.pid = as_printed(baseline.pid);
+  const double ti = baseline.pid.integral_time(), td = baseline.pid.derivative_time();
+  std::vector<double> times{baseline.pid.tracking_time};
   if (chosen) times = td > 0.0 ? std::vector{std::sqrt(ti * td), ti, td} : std::vector{ti};
   const auto formed = [&](double weight, double time) {
-    rival.pid.reference_weight = weight;
-    rival.pid.tracking_time = time > 0.0 ? (std::max)(printed(time), model.sample_time) : 0.0;
-    d.controller = pid_form(rival.pid);
+    baseline.pid.reference_weight = weight;
+    baseline.pid.tracking_time = time > 0.0 ? (std::max)(printed(time), model.sample_time) : 0.0;
+    d.controller = pid_form(baseline.pid);
   };
-  formed(rival.pid.reference_weight, times[0]);
+  formed(baseline.pid.reference_weight, times[0]);
   const LoopNumbers numbers = fine(closed_upon_itself(d.controller));
   const auto filled = [&] {
     fill_in_loop(
@@ -291,34 +291,34 @@ ESOKIT_FUNCTION void judge(TunedRival& rival, const TuneSearch& search, const Lo
     filled();
   }
   if ((d.feasible || (!chosen && d.constraint != "stability")) &&
-      search.rules.play != TunePlay::none) {
+      search.rules.simulate != TuneSimulation::none) {
     for (const double time : times) {
-      formed(rival.pid.reference_weight, time);
-      if (!play_as_is(d, model) || d.comes_back) break;
+      formed(baseline.pid.reference_weight, time);
+      if (!simulate_as_is(d, model) || d.recovers) break;
     }
   }
-  d.code = pid_source(rival.pid);
+  d.code = pid_source(baseline.pid);
 }
 
 }  // namespace detail
 
-ESOKIT_FUNCTION std::vector<TunedRival> tune_rivals(const Tuning& tuning) {
-  std::vector<TunedRival> rivals;
-  if (tuning.designs.empty()) return rivals;
-  detail::RivalSearch of(tuning);
+ESOKIT_FUNCTION std::vector<TunedPid> tune_pids(const Tuning& tuning) {
+  std::vector<TunedPid> baselines;
+  if (tuning.designs.empty()) return baselines;
+  detail::PidSearch of(tuning);
   std::vector<std::vector<double>> known;
   for (const TunedDesign& design : tuning.designs) {
     auto equal = of.equal_to(design.controller);
     if (!equal.empty()) known.push_back(std::move(equal));
   }
   // From the one with most numbers to those that are special cases of it or near to it.
-  const std::pair<RivalKind, const char*> kinds[] = {
-      {RivalKind::freely_filtered, "PID, filter of second order on y"},
-      {RivalKind::filtered, "PID, filter of second order on y, damping 0.707"},
-      {RivalKind::derivative, "PID, filtered derivative"},
-      {RivalKind::pi, "PI"}};
+  const std::pair<PidKind, const char*> kinds[] = {
+      {PidKind::freely_filtered, "PID, filter of second order on y"},
+      {PidKind::filtered, "PID, filter of second order on y, damping 0.707"},
+      {PidKind::derivative, "PID, filtered derivative"},
+      {PidKind::pi, "PI"}};
   for (const auto& [kind, name] : kinds) {
-    const auto numbers = static_cast<std::size_t>(detail::RivalSearch::numbers(kind));
+    const auto numbers = static_cast<std::size_t>(detail::PidSearch::numbers(kind));
     const auto from = of.starts(kind, known);
     const auto free = of.least(kind, false, from);
     auto best = free;
@@ -333,7 +333,7 @@ ESOKIT_FUNCTION std::vector<TunedRival> tune_rivals(const Tuning& tuning) {
     of.search.damped = true;
     if (of.lack(kind, best.at) > 0.0) best = of.least(kind, true, {best.at});
     // Never worse than what is known to be one of these.
-    if (kind == RivalKind::freely_filtered) {
+    if (kind == PidKind::freely_filtered) {
       for (const auto& x : known) {
         const bool keeps = of.lack(kind, best.at) <= 0.0;
         if (of.lack(kind, x) <= 0.0 &&
@@ -345,24 +345,24 @@ ESOKIT_FUNCTION std::vector<TunedRival> tune_rivals(const Tuning& tuning) {
     of.cost = &of.coarse;
     of.search.damped = false;
     known.push_back(best.at);
-    TunedRival rival;
-    rival.kind = kind;
-    rival.pid = of.settings(kind, best.at);
-    rival.design.name = name;
-    rival.design.numbers = static_cast<int>(numbers);
-    detail::judge(rival, of.search, of.fine, tuning.optimum, std::exp(free.value), true);
-    rivals.push_back(std::move(rival));
+    TunedPid baseline;
+    baseline.kind = kind;
+    baseline.pid = of.settings(kind, best.at);
+    baseline.design.name = name;
+    baseline.design.numbers = static_cast<int>(numbers);
+    detail::judge(baseline, of.search, of.fine, tuning.optimum, std::exp(free.value), true);
+    baselines.push_back(std::move(baseline));
   }
-  std::stable_sort(rivals.begin(), rivals.end(), [](const TunedRival& a, const TunedRival& b) {
-    const auto group = [](const TunedDesign& d) { return !d.feasible ? 2 : !d.comes_back ? 1 : 0; };
+  std::stable_sort(baselines.begin(), baselines.end(), [](const TunedPid& a, const TunedPid& b) {
+    const auto group = [](const TunedDesign& d) { return !d.feasible ? 2 : !d.recovers ? 1 : 0; };
     return group(a.design) != group(b.design) ? group(a.design) < group(b.design)
                                               : a.design.cost < b.design.cost;
   });
-  return rivals;
+  return baselines;
 }
 
-ESOKIT_FUNCTION Expected<TunedRival, Error<double>> given_rival(const Tuning& tuning,
-                                                                PlainPidConfig pid) {
+ESOKIT_FUNCTION Expected<TunedPid, Error<double>> given_pid(const Tuning& tuning,
+                                                            PlainPidConfig pid) {
   pid.lower = tuning.model.u_min;
   pid.upper = tuning.model.u_max;
   pid.sample_time = tuning.model.sample_time;
@@ -370,18 +370,18 @@ ESOKIT_FUNCTION Expected<TunedRival, Error<double>> given_rival(const Tuning& tu
   rules.all_of(pid.validate())
       .demand(!tuning.designs.empty(), "tuning.designs", 0.0, "must not be empty");
   if (!rules) return rules.error();
-  TunedRival rival;
-  rival.kind = RivalKind::given;
-  rival.pid = pid;
-  rival.design.name = "the given PID";
+  TunedPid baseline;
+  baseline.kind = PidKind::given;
+  baseline.pid = pid;
+  baseline.design.name = "the given PID";
   const auto search = detail::search_for(tuning, false);
   const LoopCost fine(tuning.model, tuning.rules, search.slowest(), 50.0);
-  detail::judge(rival, search, fine, tuning.optimum, std::numeric_limits<double>::infinity(),
+  detail::judge(baseline, search, fine, tuning.optimum, std::numeric_limits<double>::infinity(),
                 false);
-  return rival;
+  return baseline;
 }
 
-ESOKIT_FUNCTION Migration migration(const Tuning& tuning, const TunedRival& from,
+ESOKIT_FUNCTION Migration migration(const Tuning& tuning, const TunedPid& from,
                                     const TunedDesign& to) {
   Migration found;
   const TunedDesign& pid = from.design;
@@ -412,15 +412,15 @@ ESOKIT_FUNCTION Migration migration(const Tuning& tuning, const TunedRival& from
     compare("delay margin", pid.delay_margin, to.delay_margin, true, 1e3, " ms");
     compare("factor by which b0 may be wrong", pid.gain_tolerance, to.gain_tolerance, true, 1.0,
             "");
-    if (pid.played && to.played) {
-      const std::string back = "it comes back from the overloads that were played";
-      if (pid.comes_back == to.comes_back) {
-        (pid.comes_back ? found.ties : found.losses)
-            .push_back(pid.comes_back ? back : "both do not come back from an overload");
-      } else if (to.comes_back) {
-        found.gains.push_back(back + "; the PID does not come back from " + pid.lost);
+    if (pid.simulated && to.simulated) {
+      const std::string back = "it recovers from the overloads that were simulated";
+      if (pid.recovers == to.recovers) {
+        (pid.recovers ? found.ties : found.losses)
+            .push_back(pid.recovers ? back : "both do not recover from an overload");
+      } else if (to.recovers) {
+        found.gains.push_back(back + "; the PID does not recover from " + pid.lost);
       } else {
-        found.losses.push_back("it does not come back from " + to.lost + ", the PID does");
+        found.losses.push_back("it does not recover from " + to.lost + ", the PID does");
       }
     }
   }

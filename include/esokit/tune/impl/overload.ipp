@@ -6,14 +6,14 @@
 #include <esokit/analysis/linear_controller.hpp>
 #include <esokit/analysis/loop.hpp>
 #include <esokit/control/softening.hpp>
-#include <esokit/tune/play.hpp>
-#include <esokit/tune/problem.hpp>
+#include <esokit/tune/overload.hpp>
+#include <esokit/tune/specification.hpp>
 #include <utility>
 #include <vector>
 
 namespace esokit {
 
-ESOKIT_FUNCTION std::vector<detail::PlantVariant> played_variants(const TuneModel& model) {
+ESOKIT_FUNCTION std::vector<detail::PlantVariant> simulated_variants(const TuneModel& model) {
   std::vector<detail::PlantVariant> all;
   const auto take = [&](detail::PlantVariant variant, double friction) {
     variant.model.friction = friction;
@@ -26,7 +26,7 @@ ESOKIT_FUNCTION std::vector<detail::PlantVariant> played_variants(const TuneMode
   std::vector<double> frictions;
   const double unit =
       5.0 * (model.u_max - model.u_min) * (std::abs)(model.input_gain.value) * model.latency();
-  for (const double share : played_frictions) frictions.push_back(share * unit);
+  for (const double share : friction_shares) frictions.push_back(share * unit);
   if (model.friction) frictions = {*model.friction};
   for (const double friction : frictions) {
     take({model, 1.0}, friction);
@@ -36,13 +36,14 @@ ESOKIT_FUNCTION std::vector<detail::PlantVariant> played_variants(const TuneMode
   return all;
 }
 
-ESOKIT_FUNCTION std::vector<PlayEvent> played_events(const TuneModel& variant) {
-  if (variant.friction.value_or(0.0) > 0.0) return {friction_events.begin(), friction_events.end()};
-  return {play_events.begin(), play_events.end()};
+ESOKIT_FUNCTION std::vector<Overload> overloads_of(const TuneModel& variant) {
+  if (variant.friction.value_or(0.0) > 0.0)
+    return {friction_overloads.begin(), friction_overloads.end()};
+  return {overloads.begin(), overloads.end()};
 }
 
-ESOKIT_FUNCTION bool swings_with_friction(const TuneModel& model,
-                                          const LinearController& controller) {
+ESOKIT_FUNCTION bool oscillates_with_friction(const TuneModel& model,
+                                              const LinearController& controller) {
   // Largest first: behind an actuator that integrates that tells it.
   for (int i = 7; i >= -4; --i) {
     auto plant = detail::dense_plant(model);
@@ -55,11 +56,11 @@ ESOKIT_FUNCTION bool swings_with_friction(const TuneModel& model,
 
 namespace detail {
 
-ESOKIT_FUNCTION LinearController told_of_input(const LinearController& own) {
+ESOKIT_FUNCTION LinearController given_input_form(const LinearController& own) {
   LinearController c = own;
-  double told = 0.0;
-  for (int i = 0; i < c.states(); ++i) told += (std::abs)(c.from_u(i, 0));
-  if (told > 0.0) return c;
+  double applied = 0.0;
+  for (int i = 0; i < c.states(); ++i) applied += (std::abs)(c.from_u(i, 0));
+  if (applied > 0.0) return c;
   // A reference reaches the states by u alone.
   for (int i = 0; i < c.states(); ++i) {
     c.from_u(i, 0) = own.from_r(i, 0) / own.r_to_u(0, 0);
@@ -71,25 +72,25 @@ ESOKIT_FUNCTION LinearController told_of_input(const LinearController& own) {
 }
 
 template <int Order>
-SoftenedInput softened_input(const PlayedLaw& played, double T, double half) {
+SoftenedInput softened_input(const SofteningLaw& softened, double T, double half) {
   typename AdrcLaw<Order>::Config config{};
   config.gains.emplace();
-  std::copy_n(played.gains.begin(), Order, config.gains->begin());
-  config.input_gain = played.input_gain;
+  std::copy_n(softened.gains.begin(), Order, config.gains->begin());
+  config.input_gain = softened.input_gain;
   const auto law = AdrcLaw<Order>::make(config);
   const Limits<double> limits{.lower = -half, .upper = half};
   const auto limiter = Limiter<double>::make(limits, T);
   if (!law || !limiter) return {};
   const auto made = Softening<Order>::make(*law, limits, true);
   if (!made) return {};
-  return [played, T, law = *law, limiter = *limiter, soft = *made](
+  return [softened, T, law = *law, limiter = *limiter, soft = *made](
              double u, double y, double r, const std::vector<double>& z) mutable {
     if (soft.slowness() > 1.0) {
       Vector<double, Order + 1> lacks{};
       for (int i = 0; i <= Order; ++i) {
-        lacks(i) = (i == 0 ? r : 0.0) - played.y_to_estimate(i, 0) * y;
+        lacks(i) = (i == 0 ? r : 0.0) - softened.y_to_estimate(i, 0) * y;
         for (std::size_t j = 0; j < z.size(); ++j) {
-          lacks(i) -= played.to_estimate(i, static_cast<int>(j)) * z[j];
+          lacks(i) -= softened.to_estimate(i, static_cast<int>(j)) * z[j];
         }
       }
       u = soft.control(law, lacks);
@@ -99,28 +100,29 @@ SoftenedInput softened_input(const PlayedLaw& played, double T, double half) {
   };
 }
 
-inline SoftenedInput softened_input(const PlayedLaw& played, double T, double half) {
-  switch (played.gains.size()) {
+inline SoftenedInput softened_input(const SofteningLaw& law, double T, double half) {
+  switch (law.gains.size()) {
     case 1:
-      return softened_input<1>(played, T, half);
+      return softened_input<1>(law, T, half);
     case 2:
-      return softened_input<2>(played, T, half);
+      return softened_input<2>(law, T, half);
     case 3:
-      return softened_input<3>(played, T, half);
+      return softened_input<3>(law, T, half);
     case 4:
-      return softened_input<4>(played, T, half);
+      return softened_input<4>(law, T, half);
     default:
       return {};
   }
 }
 
-ESOKIT_FUNCTION PlayLoop::PlayLoop(const TuneModel& model, double gain,
-                                   const LinearController& told, double half, const PlayedLaw& law)
+ESOKIT_FUNCTION LimitedLoop::LimitedLoop(const TuneModel& model, double gain,
+                                         const LinearController& given, double half,
+                                         const SofteningLaw& law)
     : plant_(sampled_plant(dense_plant(model, gain), model.sample_time)),
-      c_(told),
+      c_(given),
       half_(half),
       x_(static_cast<std::size_t>(plant_.a.rows())),
-      z_(static_cast<std::size_t>(told.states())),
+      z_(static_cast<std::size_t>(given.states())),
       next_((std::max)(x_.size(), z_.size())),
       held_(static_cast<std::size_t>(plant_.whole[0]) + 2),
       soften_(softened_input(law, model.sample_time, half)) {
@@ -134,13 +136,13 @@ ESOKIT_FUNCTION PlayLoop::PlayLoop(const TuneModel& model, double gain,
   slid_ = 0.5 * T * unit(1) / unit(0);
 }
 
-ESOKIT_FUNCTION double PlayLoop::output() const {
+ESOKIT_FUNCTION double LimitedLoop::output() const {
   double y = 0.0;
   for (std::size_t i = 0; i < x_.size(); ++i) y += plant_.c(0, static_cast<int>(i)) * x_[i];
   return y;
 }
 
-ESOKIT_FUNCTION double PlayLoop::operator()(double y, double r, double d, double more) {
+ESOKIT_FUNCTION double LimitedLoop::operator()(double y, double r, double d, double more) {
   double u = c_.y_to_u(0, 0) * y + c_.r_to_u(0, 0) * r;
   const int states = c_.states();
   for (int i = 0; i < states; ++i) u += c_.to_u(0, i) * z_[static_cast<std::size_t>(i)];
@@ -160,7 +162,8 @@ ESOKIT_FUNCTION double PlayLoop::operator()(double y, double r, double d, double
 }
 
 template <class Input>
-void PlayLoop::advance(std::vector<double>& x, const DynamicMatrix<double>& a, const Input& input) {
+void LimitedLoop::advance(std::vector<double>& x, const DynamicMatrix<double>& a,
+                          const Input& input) {
   const int n = a.rows();
   for (int i = 0; i < n; ++i) next_[static_cast<std::size_t>(i)] = input(i);
   for (int j = 0; j < n; ++j) {
@@ -170,7 +173,7 @@ void PlayLoop::advance(std::vector<double>& x, const DynamicMatrix<double>& a, c
   for (std::size_t i = 0; i < x.size(); ++i) x[i] += next_[i];
 }
 
-ESOKIT_FUNCTION void PlayLoop::rub() {
+ESOKIT_FUNCTION void LimitedLoop::rub() {
   const double less = std::clamp(x_[1], -rub_, rub_);
   x_[1] -= less;
   x_[0] -= slid_ * less;
@@ -178,7 +181,8 @@ ESOKIT_FUNCTION void PlayLoop::rub() {
 
 }  // namespace detail
 
-ESOKIT_FUNCTION double play_distance(const TuneModel& model, double gain, const PlayEvent& event) {
+ESOKIT_FUNCTION double overload_distance(const TuneModel& model, double gain,
+                                         const Overload& event) {
   const double force =
       0.5 * (model.u_max - model.u_min) * (std::abs)(gain * model.input_gain.value);
   double distance = event.share * force;

@@ -1,6 +1,6 @@
 /// @file
-/// Plays a controller on the plant of a model, with limits and noise: does the loop come back from
-/// an overload, or does it swing between the limits for ever?
+/// Simulates a controller on the plant of a model, with limits and noise: does the loop recover
+/// from an overload, or does it swing between the limits for ever?
 #pragma once
 
 #include <algorithm>
@@ -12,34 +12,34 @@
 #include <esokit/control/softening.hpp>
 #include <esokit/core/compiled.hpp>
 #include <esokit/sim/gaussian.hpp>
-#include <esokit/tune/problem.hpp>
+#include <esokit/tune/specification.hpp>
 #include <functional>
 #include <vector>
 
 namespace esokit {
 
-/// What happens to a loop that is played.
-enum class PlayKind : unsigned char {
+/// What happens to a loop that is simulated.
+enum class OverloadKind : unsigned char {
   load,  ///< a load for some time
   kick,  ///< all at once, what half the range of u does in this time to y^(n-1)
   step   ///< of the reference, as far as half the range of u moves the chain in this time
 };
 
 /// An event, in units of the model.
-struct PlayEvent {
-  PlayKind kind{};         ///< what it is
+struct Overload {
+  OverloadKind kind{};     ///< what it is
   double share = 1.0;      ///< of half the range of u
   double latencies = 0.0;  ///< multiples of TuneModel::latency
 };
 
-/// The events that a recommended design comes back from.
-inline constexpr std::array<PlayEvent, 4> play_events{{{PlayKind::load, 1.5, 10.0},
-                                                       {PlayKind::load, 1.5, 100.0},
-                                                       {PlayKind::kick, 1.0, 30.0},
-                                                       {PlayKind::step, 1.0, 30.0}}};
+/// The events that a recommended design recovers from.
+inline constexpr std::array<Overload, 4> overloads{{{OverloadKind::load, 1.5, 10.0},
+                                                    {OverloadKind::load, 1.5, 100.0},
+                                                    {OverloadKind::kick, 1.0, 30.0},
+                                                    {OverloadKind::step, 1.0, 30.0}}};
 
 /// How a loop came through an event.
-struct Played {
+struct OverloadOutcome {
   bool counts = true;   ///< false: even the best controller would be lost
   bool back = false;    ///< y is near its reference again, and u off its limits
   double time = 0.0;    ///< s from the end of the event until then, or as long as was waited
@@ -47,49 +47,51 @@ struct Played {
   double beyond = 0.0;  ///< largest y - r beyond a step of the reference, share of the step
 };
 
-/// A law that softens at its limits, for a controller that is played: what Softening needs to know.
-struct PlayedLaw {
+/// A law that softens at its limits, for a controller that is simulated: what Softening needs to
+/// know.
+struct SofteningLaw {
   std::vector<double> gains{};          ///< k_0 ..; none: the linear law
   double input_gain = 1.0;              ///< of the law
   DynamicMatrix<double> to_estimate{};  ///< as in LinearObserverForm, with the controller's states
   DynamicMatrix<double> y_to_estimate{};  ///< as in LinearObserverForm
 };
 
-/// Friction that is played where it is not known, shares of what half the range of u makes of y''
-/// in ten latencies.
-inline constexpr std::array<double, 5> played_frictions{0.05, 0.1, 0.15, 0.2, 0.25};
+/// Friction that is simulated where it is not known, shares of what half the range of u makes of
+/// y'' in ten latencies.
+inline constexpr std::array<double, 5> friction_shares{0.05, 0.1, 0.15, 0.2, 0.25};
 
-/// The plants that a design is played on: the model, what its intervals allow, and for order 3 the
-/// model with friction.
-std::vector<detail::PlantVariant> played_variants(const TuneModel& model);
+/// The plants that a design is simulated on: the model, what its intervals allow, and for order 3
+/// the model with friction.
+std::vector<detail::PlantVariant> simulated_variants(const TuneModel& model);
 
 /// The events with friction: also what moves y so little that it sticks.
-inline constexpr std::array<PlayEvent, 3> friction_events{
-    {{PlayKind::load, 0.5, 10.0}, {PlayKind::load, 1.0, 10.0}, {PlayKind::step, 1.0, 30.0}}};
+inline constexpr std::array<Overload, 3> friction_overloads{{{OverloadKind::load, 0.5, 10.0},
+                                                             {OverloadKind::load, 1.0, 10.0},
+                                                             {OverloadKind::step, 1.0, 30.0}}};
 
 /// The events of one of these plants.
-std::vector<PlayEvent> played_events(const TuneModel& variant);
+std::vector<Overload> overloads_of(const TuneModel& variant);
 
 /// Order 3: whether friction, however small, makes the loop swing for ever. On a motion of y' of
 /// amplitude A friction f acts as a damping 4 f / (pi A) (describing function), so the loop has to
 /// be stable with any: searched for from 1 / 100 to 3000 per TuneModel::latency.
-bool swings_with_friction(const TuneModel& model, const LinearController& controller);
+bool oscillates_with_friction(const TuneModel& model, const LinearController& controller);
 
 namespace detail {
 
-/// The told form of a controller that has its own u as the applied u: within limits, the applied u
-/// is another one.
-LinearController told_of_input(const LinearController& own);
+/// The form that is given the applied u, of a controller that takes its own u for it: within limits
+/// the two differ.
+LinearController given_input_form(const LinearController& own);
 
 /// u of the softened law, from u of the linear one, y, r and the states; empty for a linear law.
 using SoftenedInput =
     std::function<double(double u, double y, double r, const std::vector<double>& z)>;
 
 /// A controller and a plant within limits, sample by sample.
-class PlayLoop {
+class LimitedLoop {
  public:
-  PlayLoop(const TuneModel& model, double gain, const LinearController& told, double half,
-           const PlayedLaw& law = {});
+  LimitedLoop(const TuneModel& model, double gain, const LinearController& given, double half,
+              const SofteningLaw& law = {});
 
   [[nodiscard]] double output() const;
 
@@ -118,9 +120,9 @@ class PlayLoop {
 
 /// How far an event goes: what its share of half the range of u moves the chain in its time; of
 /// order 1 at most 60 % of what u holds against the pole. @param gain factor on b0 of the plant
-double play_distance(const TuneModel& model, double gain, const PlayEvent& event);
+double overload_distance(const TuneModel& model, double gain, const Overload& event);
 
-/// Plays one event from rest, with u about the middle of its range and the noise of the model.
+/// Simulates one event from rest, with u about the middle of its range and the noise of the model.
 /// Back is: y within 2 % of its peak and four deviations of the noise, and u mostly off its limits,
 /// for a settling time; this within 25 times the length of the event and 10 settling times. With
 /// friction for two settling times, within 10.
@@ -129,36 +131,37 @@ double play_distance(const TuneModel& model, double gain, const PlayEvent& event
 /// @param on_sample called as on_sample(t, r, y, u) once a sample
 /// @param law of a controller that softens at its limits
 template <class Callback>
-Played play(const TuneModel& model, double gain, const LinearController& controller,
-            const PlayEvent& event, double settling_time, const Callback& on_sample,
-            const PlayedLaw& law = {}) {
+OverloadOutcome simulate_overload(const TuneModel& model, double gain,
+                                  const LinearController& controller, const Overload& event,
+                                  double settling_time, const Callback& on_sample,
+                                  const SofteningLaw& law = {}) {
   const double T = model.sample_time;
   const double latency = model.latency();
   const double half = 0.5 * (model.u_max - model.u_min);
   const double force = (std::abs)(gain * model.input_gain.value) * half;
   const double length = event.latencies * latency;
-  Played result;
+  OverloadOutcome result;
   const double pull = (std::abs)(model.pole);
   // Below 60 % of what u brings back.
   if (model.pole < 0.0) {
-    const double grown = event.kind == PlayKind::kick ? event.share * length * pull
-                         : event.kind == PlayKind::load
+    const double grown = event.kind == OverloadKind::kick ? event.share * length * pull
+                         : event.kind == OverloadKind::load
                              ? std::expm1(pull * length) * (std::max)(event.share - 1.0, 0.0) +
                                    event.share * pull * latency
                              : 0.0;
     result.counts = grown < 0.6;
     if (!result.counts) return result;
   }
-  detail::PlayLoop loop(model, gain, detail::told_of_input(controller), half, law);
+  detail::LimitedLoop loop(model, gain, detail::given_input_form(controller), half, law);
   sim::Gaussian gaussian(1);
-  const double r = event.kind == PlayKind::step ? play_distance(model, gain, event) : 0.0;
+  const double r = event.kind == OverloadKind::step ? overload_distance(model, gain, event) : 0.0;
   const auto samples_of = [T](double time) {
     return static_cast<long>((std::min)(std::ceil(time / T), 1e6));
   };
-  const long pushed = event.kind == PlayKind::load   ? samples_of(length)
-                      : event.kind == PlayKind::kick ? 1
-                                                     : 0;
-  const double d = event.share * force * (event.kind == PlayKind::kick ? length / T : 1.0);
+  const long pushed = event.kind == OverloadKind::load   ? samples_of(length)
+                      : event.kind == OverloadKind::kick ? 1
+                                                         : 0;
+  const double d = event.share * force * (event.kind == OverloadKind::kick ? length / T : 1.0);
   // Friction holds for long, and then y moves again.
   const bool rubs = model.friction.value_or(0.0) > 0.0;
   const long last =
@@ -196,5 +199,5 @@ Played play(const TuneModel& model, double gain, const LinearController& control
 }  // namespace esokit
 
 #if defined(ESOKIT_HEADER_ONLY)
-#include <esokit/tune/impl/play.ipp>
+#include <esokit/tune/impl/overload.ipp>
 #endif

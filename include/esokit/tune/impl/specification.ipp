@@ -6,7 +6,7 @@
 #include <esokit/analysis/loop.hpp>
 #include <esokit/core/check.hpp>
 #include <esokit/identify/identify.hpp>
-#include <esokit/tune/problem.hpp>
+#include <esokit/tune/specification.hpp>
 #include <vector>
 
 namespace esokit {
