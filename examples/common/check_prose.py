@@ -5,6 +5,10 @@ No sentence of its text has more than 35 words; with =WORDS the whole page has a
 `wc -w` counts. Code, links and comments are no text; a cell of a table and an item of a list end a
 sentence. Of the pages behind --links only the links are looked at: files and headings exist.
 `--self-test` instead sees each refused. The last line is "N passed, N failed".
+
+check_prose.py --glossary PAGE=MOST,LONG FILE...: how often the files say a word that the table "| not |
+but |" of PAGE has in its first column: at most MOST times; and at most LONG of their sentences are too
+long. Of a source only comments and strings count.
 """
 
 import re
@@ -28,6 +32,47 @@ def problems(page, most_words=None):
     if most_words and len(page.split()) > most_words:
         found.append(f"{len(page.split())} words, more than {most_words}")
     return found
+
+
+def glossary(page):
+    """The words that its table has in the column "not", as one pattern."""
+    table = re.search(r"^\| not \| but \|\n\|[-:| ]+\|\n((?:\|.*\n)+)", page, re.MULTILINE)
+    words = [word.strip() for row in table[1].splitlines() for word in row.split("|")[1].split(",")]
+    return re.compile(r"\b(?:" + "|".join(map(re.escape, words)) + r")\b", re.IGNORECASE), table[0]
+
+
+def spoken(name, text):
+    """What a reader reads of a file: a page without its code, of a source comments and strings."""
+    if name.endswith(".md"):
+        return re.sub(r"`[^`\n]*`", "", CODE.sub("", text))
+    parts = []
+    for run in re.findall(r'(?:[ \t]*//[^\n]*\n)+|//[^\n]*\n(?:[ \t]*//[^\n]*\n)*|/\*.*?\*/|"(?:[^"\\\n]|\\.)*"', text, re.DOTALL):
+        comment = re.sub(r"^[ \t]*(?://+<?|/\*+|\*/?) ?", "", run, flags=re.MULTILINE)
+        parts.append(CODE.sub("", re.sub(r"@\w+", "\n\n", comment)))
+    return "\n\n".join(parts)
+
+
+def words_of_makers(argument, names):
+    page, _, most = argument.partition("=")
+    most, most_long = map(int, most.split(","))
+    pattern, table = glossary(Path(page).read_text(encoding="utf-8"))
+    count = {}
+    long = 0
+    for name in names:
+        text = spoken(name, Path(name).read_text(encoding="utf-8").replace(table, ""))
+        found = pattern.findall(text)
+        if found:
+            count[name] = found
+        for problem in problems(text):
+            print(f"{name}: {problem}")
+            long += 1
+    for name, found in sorted(count.items(), key=lambda item: -len(item[1])):
+        print(f"{name}: {len(found)}: {', '.join(sorted(set(map(str.lower, found))))}")
+    total = sum(map(len, count.values()))
+    fine = total <= most and long <= most_long
+    print(f"{total} words of the glossary, at most {most}; {long} long sentences, at most {most_long}")
+    print(f"{int(fine)} passed, {int(not fine)} failed")
+    return fine
 
 
 def anchors(text):
@@ -61,6 +106,13 @@ def self_test():
     wrong = [case for case in cases if len(problems(case[0], case[1])) != case[2]]
     for case in wrong:
         print(f"self-test: {case}: {problems(case[0], case[1])}")
+    pattern, _ = glossary("x\n| not | but |\n|---|---|\n| told, come back | given |\n| rival | baseline |\n\ny")
+    for name, text, count in (("a.md", "told `told` Rival\n```\ntold\n```\nretold come back", 3),
+                              ("a.hpp", 'told(); // told\n/* a rival\n told */ f("come back")', 4)):
+        cases.append(name)
+        if len(pattern.findall(spoken(name, text))) != count:
+            wrong.append(name)
+            print(f"self-test: {name}: {pattern.findall(spoken(name, text))}")
     with tempfile.TemporaryDirectory() as folder:
         page = Path(folder) / "page.md"
         for link, broken in (("page.md", 0), ("#a-head-of-it", 0), ("page.md#a-head-of-it", 0), ("#none", 1),
@@ -79,6 +131,8 @@ def main():
         sys.exit(0 if self_test() else 1)
     if len(sys.argv) < 2:
         sys.exit(__doc__.splitlines()[0])
+    if sys.argv[1] == "--glossary":
+        sys.exit(0 if words_of_makers(sys.argv[2], sys.argv[3:]) else 1)
     failed = looked = 0
     links_alone = False
     for argument in sys.argv[1:]:

@@ -19,7 +19,7 @@ namespace guards {
 template <int MostDelay>
 class RateAxisOf {
   // The motor's lag is in the model: the guards hold and bound the disturbance, not what the motor
-  // does. The gyro's filters take some samples: u is told to the observer that much later.
+  // does. The gyro's filters take some samples: u is given to the observer that much later.
   using Lagging = esokit::ModelEso<esokit::ModelParts{.order = 1, .actuator = 1}, float>;
   using Loop = esokit::Adrc<esokit::Guarded<esokit::DelayedInput<Lagging, MostDelay>>>;
   using Monitor = esokit::HealthMonitor<2, float>;

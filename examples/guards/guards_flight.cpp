@@ -113,7 +113,7 @@ void ground(Report& report) {
        bare, guarded, "rate (rad/s)", "u (-)");
 }
 
-/// b0 goes with the throttle; the law is told nothing, the truth, or the inverse.
+/// b0 goes with the throttle; the law is given nothing, the truth, or the inverse.
 void throttle(Report& report) {
   const auto fly = [](int law) {
     auto loop = rate_loop();
@@ -240,7 +240,7 @@ void pinned(Report& report) {
   const double worst_bare = peak(bare, bare.y, 1, 4);
   const double worst = peak(guarded, guarded.y, 1, 4);
   report.expect(name, "largest angle without (rad)", worst_bare, worst_bare > 2.9, "departs");
-  report.expect(name, "largest angle with the pin told (rad)", worst, worst < 0.6, "below 0.6");
+  report.expect(name, "largest angle with the pin given (rad)", worst, worst < 0.6, "below 0.6");
   const double now = guarded.d[680] + 0.8 - 35.2 * guarded.y[680];
   report.expect(name, "dhat off at the end of the pin, of b0, with it", std::abs(now) / one.b,
                 std::abs(now) < 0.5 * one.b, "below 0.5");

@@ -1,4 +1,4 @@
-// A servo on its bad days: an observer that is told another u than the actuator got, settings that
+// A servo on its bad days: an observer that is given another u than the actuator got, settings that
 // forward Euler does not bear, a hard stop, a wrong sign and a b0 ten times too small that are
 // found and taken to the safe output; and how often they are found in a thousand servos.
 //
@@ -69,17 +69,17 @@ void draw(Report& report, const std::string& name, const std::string& caption, c
 }
 
 /// Somewhere between law and actuator u is scaled (percent, per unit, a battery's sag), and the
-/// observer is told the number of the other side: a fifth of what was applied.
+/// observer is given the number of the other side: a fifth of what was applied.
 void scaled(Report& report) {
   constexpr double T = 1e-3;
-  const auto run = [](double told) {
+  const auto run = [](double given) {
     auto loop = servo(150, 60, 200, T);
     Mass mass;
     Trace trace;
     double motor = 0;
     double held = 0;
     for (int k = 0; k < 2000; ++k) {
-      loop.applied(told * held);
+      loop.applied(given * held);
       held = loop.update(mass.y, 0.2);
       trace.add(k * T, mass.y, held, loop.observer().total_disturbance());
       for (int i = 0; i < 5; ++i) {
@@ -95,13 +95,13 @@ void scaled(Report& report) {
   for (std::size_t k = 1000; k < 2000; ++k) {
     turns += (bad.y[k] - bad.y[k - 1]) * (bad.y[k - 1] - bad.y[k - 2]) < 0 ? 1 : 0;
   }
-  const std::string name = "observer told a scaled u";
+  const std::string name = "observer given a scaled u";
   report.expect(name, "frequency of the limit cycle (Hz)", turns / 2.0, turns > 30 && turns < 60,
                 "15 to 30 (the record has 25)");
   const double cycle = peak(bad, bad.u, 1, 2);
-  report.expect(name, "largest u at rest, told a fifth", cycle, cycle > 0.3, "above 0.3");
+  report.expect(name, "largest u at rest, given a fifth", cycle, cycle > 0.3, "above 0.3");
   const double rest = peak(good, good.u, 1, 2);
-  report.expect(name, "largest u at rest, told what was applied", rest, rest < 0.01, "below 0.01");
+  report.expect(name, "largest u at rest, given what was applied", rest, rest < 0.01, "below 0.01");
   draw(report, "scaled",
        "The observer is passed a fifth of the u that the actuator got: dhat compensates the rest, "
        "but late, and the loop oscillates over the full range of u. If the applied u is passed, "
@@ -196,8 +196,8 @@ void stop(Report& report) {
 
 enum class Wrong { healthy, sign, small, large };
 
-/// What a run tells: when u first told something (s), when it first was at a limit, and when it was
-/// found out.
+/// What a run shows: when u first showed the fault (s), when it first was at a limit, and when it
+/// was found out.
 struct Found {
   double excited = -1, limited = -1, sign = -1, small = -1;
   double observer = 1;  ///< omega_o

@@ -14,7 +14,7 @@ namespace trades {
 
 class ColdHeater {
   // Heat to temperature is one integration, and the sensor lags. The losses are found; those by the
-  // fan are told. It acts at once, the heater after its dead time.
+  // fan are given. It acts at once, the heater after its dead time.
   using Slow = esokit::ModelEso<esokit::ModelParts{.order = 1, .sensor = 1}>;
 
  public:

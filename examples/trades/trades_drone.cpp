@@ -32,11 +32,11 @@ struct Flight {
 };
 
 /// A step of 3 rad/s at 0.1 s, a gust of 60 rad/s^2 from 0.8 to 1.3 s.
-/// @param told the lag of the motors that the controller is given
-Flight fly(float bandwidth, double told = lag) {
+/// @param given the lag of the motors that the controller is given
+Flight fly(float bandwidth, double given = lag) {
   auto axis = RateAxis::make({.sample_time = static_cast<float>(1 / rate_hz),
                               .hover_gain = static_cast<float>(gain),
-                              .motor_lag = static_cast<float>(told),
+                              .motor_lag = static_cast<float>(given),
                               .gyro_delay = static_cast<float>(filter),
                               .controller_bandwidth = bandwidth})
                   .value();
@@ -132,7 +132,7 @@ int main(int argc, char** argv) {
                 fast.deviation / slow.deviation, fast.deviation < 0.4 * slow.deviation,
                 "below 0.4");
   const Flight guessed = fly(80, 0.02);
-  row("80 rad/s, told a motor lag of 20 ms", guessed);
+  row("80 rad/s, given a motor lag of 20 ms", guessed);
 
   const RateAxis::Config good{.sample_time = 1.25e-4f, .gyro_delay = 4e-3f};
   const auto names = [&](const char* what, RateAxis::Config config, const char* rule) {

@@ -81,14 +81,14 @@ struct Pulse {
 };
 
 /// The fan from 50 to 450 s, at rest before.
-/// @param told what a fan adds to u, by the temperature shown
-Pulse pulse(const Law& law, const Law& told = nullptr) {
+/// @param given what a fan adds to u, by the temperature shown
+Pulse pulse(const Law& law, const Law& given = nullptr) {
   Pulse pulse;
   Lab lab(wanted);
   const double rest = lab.holding();
   for (int k = 0; k < 8500; ++k) {
     const double t = k * T, fan = t >= 50 && t < 450 ? 1 : 0;
-    const double known = told ? fan * told(lab.shown()) : 0;
+    const double known = given ? fan * given(lab.shown()) : 0;
     const double u = std::clamp(rest + law(lab.shown() - wanted) + known, 0.0, 1.0);
     const double error = std::abs(lab.block() - wanted);
     pulse.most = std::max(pulse.most, error);
@@ -279,7 +279,7 @@ int main(int argc, char** argv) {
   std::array<Way, 3> ways{
       Way{"PI", [&](const Numbers& numbers) { return pi(model, numbers); }},
       Way{"Smith predictor", [&](const Numbers& numbers) { return smith(model, numbers); }},
-      Way{"ADRC, not told",
+      Way{"ADRC, not given",
           [&](const Numbers& numbers) { return adrc(heater.settings(), model, numbers); }}};
   choose(ways[0], model, {0.7, 5});
   choose(ways[1], model, {0.8, 4});
@@ -348,8 +348,8 @@ int main(int argc, char** argv) {
       if (!heater.set_fan_cooling((at == 2 ? 0.7 : 1.0) * cooling)) return 1;
     }
     if (at == 4) goal = 40;
-    const double told = at == 3 ? std::numeric_limits<double>::quiet_NaN() : fan;
-    const double power = heater.step(lab.shown(), goal, told);
+    const double given = at == 3 ? std::numeric_limits<double>::quiet_NaN() : fan;
+    const double power = heater.step(lab.shown(), goal, given);
     if (start == 0 && heater.trial().finished()) {
       start = time;
       jump = std::abs(power - heater.trial().centre());
@@ -376,16 +376,16 @@ int main(int argc, char** argv) {
   const double doubled = 5 * 1.2e-3 / (0.004 * 500);
   report.check_reference("from cold", "what the fan takes (1/s)", doubled, cooling, 0.15,
                          "as simulated");
-  report.expect("fan", "dip, not told (degC)", dip[0], true, "reported");
-  report.expect("fan", "dip, told (degC)", dip[1], dip[1] < 0.3, "below 0.3");
-  report.expect("fan", "dip, told 30 % too little (degC)", dip[2], dip[2] < dip[0],
-                "below what it is if not told");
+  report.expect("fan", "dip, not given (degC)", dip[0], true, "reported");
+  report.expect("fan", "dip, given (degC)", dip[1], dip[1] < 0.3, "below 0.3");
+  report.expect("fan", "dip, given 30 % too little (degC)", dip[2], dip[2] < dip[0],
+                "below what it is if not given");
   report.expect("fan", "dip, lost (degC)", dip[3], std::abs(dip[3] / dip[0] - 1) < 0.2,
-                "as if it were not told");
-  report.expect("fan", "dip at 40 degC, told (degC)", dip[4], dip[4] < 0.3,
+                "as if it were not given");
+  report.expect("fan", "dip at 40 degC, given (degC)", dip[4], dip[4] < 0.3,
                 "what was found at 50 degC is true at 40");
 
-  // The others, told the same.
+  // The others, given the same.
   for (const Way& way : {ways[0], ways[1]}) {
     const Pulse fan = pulse(played(way.form(way.numbers)),
                             [&](double shown) { return cooling * (shown - room) / model.gain; });
@@ -396,9 +396,9 @@ int main(int argc, char** argv) {
   Figure figure("heater_cold", {.rows = 2, .columns = 2, .panel_height = 190});
   figure.caption(
       "Left, from cold: full power, a relay that finds gain, lag and dead time, ADRC from the "
-      "dashed line on, and five times a fan of 100 % for 400 s: not told, told, told 30 % too "
-      "little, lost, told at 40 degrees. Right: a fan from 50 to 450 s under a PI and a Smith "
-      "predictor, and under ADRC, not told and told; all tuned by one rule.");
+      "dashed line on, and five times a fan of 100 % for 400 s: not given, given, given 30 % too "
+      "little, lost, given at 40 degrees. Right: a fan from 50 to 450 s under a PI and a Smith "
+      "predictor, and under ADRC, not given and given; all tuned by one rule.");
   figure.panel(0, 0)
       .y_label("T (°C)")
       .hide_x_numbers()
@@ -418,7 +418,7 @@ int main(int argc, char** argv) {
     right.line(Column(ways[i].fan.t), ways[i].fan.y, {.name = ways[i].name, .color = colors[i]});
     power.line(Column(ways[i].fan.t), ways[i].fan.u, {.color = colors[i]});
   }
-  right.line(Column(told_t), told_y, {.name = "ADRC, told", .color = Color::green});
+  right.line(Column(told_t), told_y, {.name = "ADRC, given", .color = Color::green});
   power.line(Column(told_t), told_u, {.color = Color::green});
   report.add(figure);
   return report.finish();

@@ -1,14 +1,14 @@
 // INDI or ADRC? One axis of a drone, four ways, all tuned by one rule: incremental dynamic
 // inversion with the rotor's speed measured and with a model of it, ADRC with the rotor's lag in
-// the model, and ADRC that is told nothing of it.
+// the model, and ADRC that is given nothing of it.
 //
 // Plant   y' = b v + d, tau v' = u - v; b = 600 rad/s^2, tau = 30 ms, T = 1 ms, abs(u) <= 1
 //         gyro noise 0.02 rad/s a sample; v: what the rotors do, from their measured speed
 // INDI    u = v_f + (nu - y'_f) / b, nu = omega_c (r - y), both filtered alike, at omega_f
 //
 // With y'_f = H (y[k] - y[k-1]) / T and v_f = H (mean of v over the sample) this is an observer of
-// order 1 that is told v as its input: dhat = H (y' - b v), and u = (nu - dhat) / b. The poles of H
-// are those of the observer's error. The program checks that sample by sample.
+// order 1 that is given v as its input: dhat = H (y' - b v), and u = (nu - dhat) / b. The poles of
+// H are those of the observer's error. The program checks that sample by sample.
 
 #include <algorithm>
 #include <cmath>
@@ -212,7 +212,7 @@ Judged judge_indi(const Design& design, const Axis& axis, bool measured) {
   const Filter filter(design.observer);
   const double pi = std::acos(-1.0);
   const double a = std::exp(-T / axis.lag);
-  const double told = std::exp(-T / (measured ? axis.lag : lag));
+  const double given = std::exp(-T / (measured ? axis.lag : lag));
   constexpr int points = 600;
   Judged judged{1e9, 0};
   double turned = 0, before = 0;
@@ -224,7 +224,7 @@ Judged judge_indi(const Design& design, const Axis& axis, bool measured) {
     const auto telemetry = std::polar(1.0, -angle * (measured ? axis.telemetry : 0));
     const auto v = (1 - a) * back / (1.0 - a * back);
     const auto y = axis.gain * (T + (v - 1.0) * axis.lag * (1 - a)) * back / (1.0 - back) * gyro;
-    const auto seen = (1 - told) * back / (1.0 - told * back) * telemetry;
+    const auto seen = (1 - given) * back / (1.0 - given * back) * telemetry;
     const auto h = filter.response(1.0 / back);
     const auto from_y = design.drive * (design.controller + h * (1.0 - back) / T) / gain;
     const auto one_plus_l = 1.0 - (1 - design.drive) * seen + from_y * y -
@@ -301,7 +301,7 @@ int main(int argc, char** argv) {
   Report report(
       argc, argv, "trades", "indi",
       trades::about("INDI or ADRC?",
-                    "Incremental dynamic inversion is an observer of order 1 that is told "
+                    "Incremental dynamic inversion is an observer of order 1 that is given "
                     "what the rotors do. Both at equal margins and noise, with the "
                     "rotors' speed measured and not."));
   {  // One and the same, while u is at its limits, too.

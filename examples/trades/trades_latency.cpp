@@ -217,9 +217,9 @@ int main(int argc, char** argv) {
                         {"P by LQR, compensated", law_of_pi, by(form_of_p)},
                         {"PI", law_of_pi, by(form_of_pi)},
                         {"PI, reference late, too", law_of_waiting_pi, by(form_of_pi)},
-                        {"ADRC, delay not told", law_of<Plain>, by(adrc<Plain>)},
-                        {"ADRC, delay told", law_of<Told>, by(adrc<Told>)},
-                        {"ADRC, delay and kV told", law_of<Knowing>, by(adrc<Knowing>)}};
+                        {"ADRC, delay not known", law_of<Plain>, by(adrc<Plain>)},
+                        {"ADRC, delay known", law_of<Told>, by(adrc<Told>)},
+                        {"ADRC, delay and kV known", law_of<Knowing>, by(adrc<Knowing>)}};
   const double a = std::exp(-kV / kA * T), b = (1 - a) / kV, k = lqr(a, b);
   ways[0].gains = {k, 0};
   ways[1].gains = {k * (a - b * k), 0};
@@ -248,7 +248,7 @@ int main(int argc, char** argv) {
     row("its area (m)", way.drove.area);
   }
   const auto over = [&](const char* name, double ratio) {
-    report.expect("ADRC, delay and kV told", name, ratio, true, "reported");
+    report.expect("ADRC, delay and kV known", name, ratio, true, "reported");
   };
   over("area over the PI's", ways[6].drove.area / ways[2].drove.area);
   over("error on the profile over the PI's", ways[6].drove.tracking / ways[2].drove.tracking);

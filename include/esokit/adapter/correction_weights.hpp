@@ -19,8 +19,8 @@ enum class Pin : unsigned char {
 
 namespace detail {
 
-/// What was told of the present corrections, and the factors that follow, see Guarded. After a
-/// change of it `weigh` has to be called.
+/// What the caller said of the present corrections, and the factors that follow, see Guarded. After
+/// a change of it `weigh` has to be called.
 template <PlainScalar S>
 struct CorrectionWeights {
   S trust = S(1);
@@ -29,7 +29,7 @@ struct CorrectionWeights {
   Pin pin = Pin::free;
   signed char side = 0;  ///< limit at which the actuator is pinned: 1 upper, -1 lower, 0 unknown
   bool held = false;
-  bool unsettled = false;  ///< held, but no measurement has told where since
+  bool unsettled = false;  ///< held, but no measurement has shown where since
   bool gated = false;
   bool frozen = false;  ///< no correction of dhat counts until the observer has settled
   bool acts = false;    ///< any of these, or a leak: one test in the hot path

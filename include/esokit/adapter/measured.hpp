@@ -45,7 +45,7 @@ requires(detail::goes_into_a_loop<Observer>()) struct MeasuredConfig {
 ///
 /// A gain that is wrong by 30 % leaves 30 % of f to the observer, which finds it like any d.
 /// With an actuator in the model f acts on the plant behind the actuator, as it does in reality.
-/// Guarded bounds and leaks f + d, and holds or scales what is found, not what is told.
+/// Guarded bounds and leaks f + d, and holds or scales what is found, not what is given.
 /// Measured goes around VariableTime, not inside: the dead time is then counted in present steps.
 /// @tparam Count number of disturbances that are measured @tparam Delay longest dead time, samples;
 ///         the memory is Delay + 2 scalars each
@@ -222,7 +222,7 @@ requires(detail::shifts_load<Observer>()) class Measured
     return all;
   }
 
-  /// Tells the observer the present f. If the estimate would not be finite, it is told later.
+  /// Gives the observer the present f. If the estimate would not be finite, it is given later.
   void tell() noexcept {
     const S now = sum();
     const S more = now - told_;

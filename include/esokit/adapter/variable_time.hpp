@@ -18,7 +18,7 @@ requires(detail::goes_into_a_loop<Observer>()) struct VariableTimeConfig {
   S ratio = S(4);                        ///< above 1: steps may take T / ratio .. T ratio
 };
 
-/// Before each step the observer is told how long the step took; model and gains follow exactly.
+/// Before each step the observer is given how long the step took; model and gains follow exactly.
 ///
 /// A step with another length than the last one is a retune: the whole `make` of the observer, with
 /// its checks and one expm1 per level (LinearEso<2>: 40 .. 80 ns on a desktop, the time of some

@@ -41,7 +41,7 @@ struct ScanRange {
 ScanRange scan_range(const Loop& loop, int channel);
 
 /// L at frequency zero, which is real; NaN if plant or controller integrates. As this makes L
-/// infinite in theory but only very large in numbers, it is told by the rise from the lowest
+/// infinite in theory but only very large in numbers, it is recognised by the rise from the lowest
 /// frequency, at which everything slow has ended.
 double loop_gain_at_zero(const LoopGain& response, const ScanRange& range);
 

@@ -1,5 +1,5 @@
 /// @file
-/// From a disturbance that is measured to y, with what the controller is told of it.
+/// From a disturbance that is measured to y, with what the controller knows of it.
 #pragma once
 
 #include <complex>

@@ -62,10 +62,10 @@ requires(detail::goes_into_a_loop<Observer>()) struct AdrcConfig {
 /// what to choose.
 ///
 /// Overload (`soften`): for n >= 3 (of the law, so with the lag of an actuator in the model) a loop
-/// is stable for a range of gains only, and limits lower its gain. Below that range it swings from
-/// limit to limit for ever, after one overload. The same happens for n = 2 if k_1 / k_0 is smaller
-/// than the latency of the plant. So the law gets softer while it asks for more than u can give,
-/// and slowly recovers, see Softening. The analysis
+/// is stable for a range of gains only, and limits lower its gain. Below that range it oscillates
+/// from limit to limit for ever, after one overload. The same happens for n = 2 if k_1 / k_0 is
+/// smaller than the latency of the plant. So the law gets softer while it asks for more than u can
+/// give, and slowly recovers, see Softening. The analysis
 /// (`linear_controller`, `margins`) is of the law as designed, `softness()` 1; below, the loop is
 /// another one. PredictiveAdrc and MimoAdrc do not have it.
 ///

@@ -183,7 +183,7 @@ class ControlLoop {
 
   /// Checks the settings.
   /// @param observer as returned by its `make`
-  /// @param watched the law is told at every sample that something is special
+  /// @param watched the law is called at every sample that something is special
   /// @return the loop, with the observer in its present state, or an error that names the field
   static Expected<ControlLoop, Error<S>> make(const Observer& observer,
                                               const LoopSettings<S>& settings,
@@ -532,7 +532,7 @@ class ControlLoop {
     return static_cast<std::uint16_t>(phase_ + 1 == set_.divider ? 0 : phase_ + 1);
   }
 
-  // What a good sample touches comes last, beside the weights of a law, and what it writes side by
+  // What a valid sample touches comes last, beside the weights of a law, and what it writes side by
   // side: a bank of packs waits for memory. The padding of an object holds what is next.
   [[no_unique_address]] Set set_;
   Lanes<LoopMode, S> mode_;

@@ -383,7 +383,7 @@ requires(detail::is_a_plain_scalar<S>()) class Experiment {
     response_samples_ =
         samples < S(limit_samples_) ? static_cast<std::int32_t>(samples) : limit_samples_;
     if (response_samples_ < 1) response_samples_ = 1;
-    // Below what y moves within the latency, lag and dead time would not be told apart.
+    // Below what y moves within the latency, lag and dead time would not be distinguished.
     const S least = slope_ * (approach_delay() / config_.sample_time) / detail::absolute(longer);
     const S up = config_.highest_output - rest_, down = rest_ - config_.lowest_output;
     const bool fits = S(2) * least < up && S(2) * least < down && S(2) * least < config_.travel;

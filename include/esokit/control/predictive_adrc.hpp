@@ -23,7 +23,7 @@ namespace esokit {
 
 namespace detail {
 
-/// What was told of the present sample.
+/// What the caller said of the present sample.
 enum class PredictivePhase : unsigned char {
   started,  // and u is not yet one of the controller
   prepared,

@@ -48,7 +48,7 @@ template <class T>
 [[nodiscard]] Snapshot<T> snapshot(const T& object) noexcept {
   Snapshot<T> words{};
   // No bit_cast, as T may have padding. And no __builtin_clear_padding: that of GCC 12 also clears
-  // half of a number beside an empty member (a ModelEso came back with another gain).
+  // half of a number beside an empty member (a ModelEso was restored with another gain).
   std::memcpy(words.data(), &object, sizeof(T));
   words.back() = detail::checksum<T>(words);
   return words;
@@ -56,7 +56,7 @@ template <class T>
 
 /// The object from which `words` were made, without design work (no exp, no iteration).
 /// @return error if the words are not as `snapshot` made them: a lost digit, another version of the
-///         library, another type. Types are told apart by `type_tag`, and by their size only if
+///         library, another type. Types are distinguished by `type_tag`, and by their size only if
 ///         they declare none (a model or gain law of your own)
 template <class T>
 [[nodiscard]] Expected<T, Error<typename T::scalar_type>> from_snapshot(

@@ -68,7 +68,7 @@ std::size_t bridge(std::vector<double>& column);
 }  // namespace detail
 
 /// Checks a log and converts it to a constant sample time. If the time stamps jitter by more than 2
-/// % of T, or rows are missing, u is the mean of what the actuator held in the row (also told by
+/// % of T, or rows are missing, u is the mean of what the actuator held in the row (also said by
 /// rows without y), y and the columns are interpolated linearly, and `FitData::measured` has y as
 /// and when it was measured.
 [[nodiscard]] Expected<PreparedLog, Error<double>> prepare(const Log& log);

@@ -34,7 +34,7 @@ struct MeasuredEffect {
   /// The settings of `Measured`, where w is held from its sample to the next: half a sample less of
   /// latency, first of dead time, then of lag.
   /// @param sample_time s @param input_latency how much later u acts than the observer knows, s:
-  /// the law is told of w so much sooner
+  /// the law is given w so much sooner
   [[nodiscard]] MeasuredInput<double> held(double sample_time, double input_latency = 0.0) const;
 };
 
@@ -47,7 +47,8 @@ double share_left(const std::vector<double>& values, const std::vector<double>& 
 /// A column that follows another one leaves less than this share of its squares.
 constexpr double follows = 1e-3;
 
-/// Whether column `c` of the log can be told from a constant, from u and from those before it.
+/// Whether column `c` of the log can be distinguished from a constant, from u and from those before
+/// it.
 Check<double> tells_itself(const FitData& data, std::size_t c);
 
 /// Makes the first `count` columns timed ones, still at once.

@@ -271,8 +271,9 @@ concept ShiftableDisturbance = LoopObserver<O> &&
   { observer.shift_disturbance(s) } -> std::same_as<StatusOf<typename O::scalar_type>>;
 };
 
-/// An observer that can be told a load on the plant: `shift_load(offset)` adds to the constant part
-/// of the disturbance, unit of y^(n) with n of the plant. It returns the same as `shift_output`.
+/// An observer that can be given a load on the plant: `shift_load(offset)` adds to the constant
+/// part of the disturbance, unit of y^(n) with n of the plant. It returns the same as
+/// `shift_output`.
 template <class O>
 concept ShiftableLoad = LoopObserver<O> && requires(O& observer, const typename O::scalar_type& s) {
   { observer.shift_load(s) } -> std::same_as<StatusOf<typename O::scalar_type>>;
@@ -420,9 +421,10 @@ consteval bool shifts_disturbance() {
 }
 template <class O>
 consteval bool shifts_load() {
-  static_assert(ShiftableLoad<O>,
-                "esokit: Measured needs an observer that can be told a load, such as LinearEso<2>: "
-                "the concept ShiftableLoad");
+  static_assert(
+      ShiftableLoad<O>,
+      "esokit: Measured needs an observer that can be given a load, such as LinearEso<2>: "
+      "the concept ShiftableLoad");
   return ShiftableLoad<O>;
 }
 /// @}

@@ -13,7 +13,7 @@
 namespace esokit {
 namespace detail {
 
-/// What a good sample of a PredictorCorrector reads and writes. A step returns false, and has
+/// What a valid sample of a PredictorCorrector reads and writes. A step returns false, and has
 /// changed nothing, if a result is not finite. It knows of no gap, restart or status.
 ///
 /// For the chain, level i stores only the disturbance that it has found in addition to the levels
@@ -271,7 +271,7 @@ struct LevelNumbers {
     return true;
   }
 
-  /// What a good sample writes: scalars only. It survives a retune, all else is replaced.
+  /// What a valid sample writes: scalars only. It survives a retune, all else is replaced.
   struct Kept {
     LevelStates states{};
     S innovation = S(0.0);

@@ -49,7 +49,7 @@ Check<S> check_chain(const ChainConfig<S>& config) {
 ///
 /// One instance belongs to one thread. No member allocates, throws or locks after `make`.
 ///
-/// After any input, however bad, good samples lead back to a good estimate: the error decays by
+/// After any input, however bad, valid samples lead back to a good estimate: the error decays by
 /// e^(-r T) a sample, r the rate of its slowest pole, from the largest number of the scalar to
 /// rounding in at most 60 + 2 ln(max / epsilon) / (r T) samples. This is tested with every observer
 /// and adapter: double 60 + 1500 / (r T), float 60 + 210 / (r T) samples. With all poles at one

@@ -122,8 +122,8 @@ struct RunConfig {
   /// plant; in other plants it is added to u.
   RunSignal<typename Types::S, Types::inputs> disturbance{};
 
-  /// w, a number or a function of t, told to a controller that takes one measured disturbance; NaN:
-  /// lost. What w does to the plant belongs into `disturbance` or the plant.
+  /// w, a number or a function of t, given to a controller that takes one measured disturbance;
+  /// NaN: lost. What w does to the plant belongs into `disturbance` or the plant.
   RunSignal<typename Types::S, 1> measured{};
 
   Output noise{};  ///< standard deviation of the white normal measurement noise, unit of y

@@ -1,6 +1,6 @@
 /// @file
 /// Simulates a controller on the plant of a model, with limits and noise: does the loop recover
-/// from an overload, or does it swing between the limits for ever?
+/// from an overload, or does it oscillate between the limits for ever?
 #pragma once
 
 #include <algorithm>
@@ -72,9 +72,9 @@ inline constexpr std::array<Overload, 3> friction_overloads{{{OverloadKind::load
 /// The events of one of these plants.
 std::vector<Overload> overloads_of(const TuneModel& variant);
 
-/// Order 3: whether friction, however small, makes the loop swing for ever. On a motion of y' of
-/// amplitude A friction f acts as a damping 4 f / (pi A) (describing function), so the loop has to
-/// be stable with any: searched for from 1 / 100 to 3000 per TuneModel::latency.
+/// Order 3: whether friction, however small, makes the loop oscillate for ever. On a motion of y'
+/// of amplitude A friction f acts as a damping 4 f / (pi A) (describing function), so the loop has
+/// to be stable with any: searched for from 1 / 100 to 3000 per TuneModel::latency.
 bool oscillates_with_friction(const TuneModel& model, const LinearController& controller);
 
 namespace detail {

@@ -385,8 +385,8 @@ ESOKIT_FUNCTION Expected<Tuning, Error<double>> tune(const TuneModel& given,
   tuning.model = model;
   const Lqg lqg(model);
   const double slow = slowest_of(model);
-  // What keeps order 2 from swinging at its limits: sqrt(2) / w is k_1 / k_0 of an LQR law, 2 / w
-  // that of a given bandwidth.
+  // What keeps order 2 from oscillating at its limits: sqrt(2) / w is k_1 / k_0 of an LQR law, 2 /
+  // w that of a given bandwidth.
   const double damped = n == 2 && rules.damping_latencies > 0.0
                             ? 1.0 / (rules.damping_latencies * latency)
                             : std::numeric_limits<double>::infinity();
