@@ -68,6 +68,9 @@ class RunChance {
     return disturbed(t, y);
   }
 
+  /// Whether the measurement is y.
+  [[nodiscard]] bool quiet() const noexcept { return quiet_; }
+
   /// Time from this sample to the next, s.
   Time step_time(std::int64_t k, const Time& sample_time) {
     if (config_.step_time) return config_.step_time(k);
@@ -139,12 +142,12 @@ class RunningSignal {
 
  public:
   explicit RunningSignal(const Signal& signal) : signal_(signal), constant_(signal.constant()) {
-    if (constant_) now_ = signal(Time(0));
+    if (constant_) signal.write(Time(0), now_);
   }
 
   /// Its value at t, from now on that of `now`.
   ESOKIT_INLINE const Value& at(const Time& t) {
-    if (!constant_) now_ = signal_(t);
+    if (!constant_) signal_.write(t, now_);
     return now_;
   }
   [[nodiscard]] ESOKIT_INLINE const Value& now() const noexcept { return now_; }
@@ -202,6 +205,7 @@ class Run {
     }
     if (steps_.size() > 1 || stretches_[0].age > 0)
       return drive<true, false>(controller, on_sample);
+    if (first_ && chance_.quiet()) return drive<true, true, true>(controller, on_sample);
     return drive<true, true>(controller, on_sample);
   }
 
@@ -226,10 +230,12 @@ class Run {
     return {};
   }
 
+  /// @tparam First if y may be the first state, it is
+  template <bool First>
   ESOKIT_INLINE Output output(const Time& t, const typename P::State& x) const {
     if constexpr (is_linear_plant<P>) {
       if constexpr (Types::outputs == 1) {
-        if (first_) return x(0);
+        if (First || first_) return x(0);
       }
       return plant_.output(x);
     } else {
@@ -254,7 +260,8 @@ class Run {
   }
 
   /// @tparam Even all samples are equally long @tparam Direct each is one stretch under its own u
-  template <bool Even, bool Direct, class Callback>
+  /// @tparam Plain the measurement is y, and y needs no product with C
+  template <bool Even, bool Direct, bool Plain = false, class Callback>
   [[gnu::__noinline__]] Outcome drive(C controller, Callback& on_sample) {
     constexpr bool channels = Types::references > 1 && !Types::derivatives;
     // Local copies of everything that is used in every sample, so that the compiler knows that
@@ -278,8 +285,8 @@ class Run {
       with(reference.now(), plain, [&](const auto& r) { controller.set_reference(r); });
     }
     for (std::int64_t k = 0;; ++k) {
-      const Output y = output(t, x);
-      const Output measurement = chance_.measured(t, y);
+      const Output y = output<Plain>(t, x);
+      const Output measurement = Plain ? y : chance_.measured(t, y);
       if constexpr (!Even && controller_traits<C>.varies_time) {
         if (const auto ok = controller.set_step_time(Own(passed)); !ok) {
           return as_error<Time>(ok.error());
@@ -358,8 +365,8 @@ class Run {
   Time sample_time_, dead_time_;
   std::int64_t samples_;
   bool even_;
-  int oldest_;          ///< largest age of an input, samples
-  bool first_ = false;  ///< y is the first state of a linear plant: no product with C is needed
+  int oldest_;         ///< largest age of an input, samples
+  bool first_ = true;  ///< y needs no product with C: a linear plant's is its first state
   InputQueue<Input> inputs_;
   InputQueue<Time> lengths_;
   RunChance<P, C> chance_;

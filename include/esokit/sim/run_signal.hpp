@@ -57,15 +57,12 @@ class RunSignal {
     if constexpr (Derivatives && Count > 1 && DifferentiableSignal<F, Time> &&
                   std::same_as<ScalarType, Time>) {
       plain_ = false;
-      function_ = [f = std::move(f)](const Time& t) {
+      function_ = [f = std::move(f)](const Time& t, Value& value) {
         const auto all = f.template derivatives<Count>(t);
-        Value value;
         for (int i = 0; i < Count; ++i) value(i) = all[static_cast<std::size_t>(i)];
-        return value;
       };
     } else {
-      function_ = [f = std::move(f)](const Time& t) {
-        Value value;
+      function_ = [f = std::move(f)](const Time& t, Value& value) {
         if constexpr (std::convertible_to<Result, ScalarType>) {
           value(0) = static_cast<ScalarType>(f(t));
         } else {
@@ -74,7 +71,6 @@ class RunSignal {
             value(i) = static_cast<ScalarType>(given(i));
           }
         }
-        return value;
       };
     }
   }
@@ -84,16 +80,14 @@ class RunSignal {
   requires(lane_count<ScalarType> > 1 && std::same_as<Plain, LaneScalar<ScalarType>>)
       RunSignal(const RunSignal<Plain, Count, Derivatives>& plain)
       : plain_(plain.plain()) {
-    const auto all_lanes = [plain](const Time& t) {
+    const auto all_lanes = [plain](const Time& t, Value& value) {
       const auto numbers = plain(t);
-      Value value;
       for (int i = 0; i < Count; ++i) {
         for (int lane = 0; lane < lane_count<ScalarType>; ++lane) value(i)[lane] = numbers(i);
       }
-      return value;
     };
     if (plain.constant()) {
-      constant_ = all_lanes(Time(0));
+      all_lanes(Time(0), constant_);
     } else {
       function_ = all_lanes;
     }
@@ -101,7 +95,17 @@ class RunSignal {
 
   /// The value at t.
   [[nodiscard]] Value operator()(const Time& t) const {
-    return function_ ? function_(t) : constant_;
+    Value value;
+    write(t, value);
+    return value;
+  }
+  /// The same into `value`, which is zero or was written before: a loop has no numbers to copy.
+  void write(const Time& t, Value& value) const {
+    if (function_) {
+      function_(t, value);
+    } else {
+      value = constant_;
+    }
   }
 
   /// True if it gives one number; derivatives, if needed, are then zero.
@@ -111,7 +115,7 @@ class RunSignal {
 
  private:
   Value constant_{};
-  std::function<Value(const Time&)> function_;
+  std::function<void(const Time&, Value&)> function_;  ///< writes the same elements each time
   bool plain_ = true;
 };
 
