@@ -161,7 +161,7 @@ void add_all(const std::string& scalar) {
     add<Raw>(raw, raw_eso<One>(), lanes, false, "");
     add<One>(bank + "linear_eso/2/" + scalar, linear<One>(), lanes, false, "");
     add<P>(bank + "linear_eso/2/pack_of_" + scalar, Packed<LinearEso<2, One>>(linear<One>()), lanes,
-           false, beside("linear_eso/2", "; vs " + raw + few("1.20", "2.30")));
+           false, beside("linear_eso/2", "; vs " + raw + few("1.20", "1.30")));
     add<One>(bank + "cascade_eso/2x3/" + scalar, cascade<One>(), lanes, false, "");
     add<P>(bank + "cascade_eso/2x3/pack_of_" + scalar,
            Packed<CascadeEso<2, 3, One>>(cascade<One>()), lanes, false,
@@ -177,7 +177,7 @@ void add_all(const std::string& scalar) {
       }
       add<P>(bank + name + "/pack_of_" + scalar, Packed<Adrc<LinearEso<2, One>>>(adrc<One>(rate)),
              lanes, false,
-             beside(name, "; vs " + raw_adrc_name + few("1.20", rate ? "1.60" : "1.50")));
+             beside(name, "; vs " + raw_adrc_name + few("1.20", rate ? "1.30" : "1.35")));
     }
   }
   // One of each that works on all lanes in its own way, and what goes lane by lane.

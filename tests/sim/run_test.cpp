@@ -606,4 +606,23 @@ TEST(Run, RefusesBadSettings) {
             "sample_time: is so long that the plant's states leave the range of the scalar");
 }
 
+/// The loop skips the product with C where y is the first state, and the noise where there is none.
+TEST(Run, MeasuresByAnyRowOfC) {
+  for (const State& row : {State{1, 0}, State{0.5, 0}, State{1, 0.1}, State{0, 1}}) {
+    for (const double noise : {0.0, 1e-3}) {
+      auto plant = servo();
+      plant.c = {{row(0), row(1)}};
+      int wrong = 0, noisy = 0;
+      (void)sim::run(plant, adrc(), {.duration = 200 * T, .reference = step, .noise = noise},
+                     [&](const auto& sample) {
+                       wrong += sample.output != plant.output(sample.state) ? 1 : 0;
+                       noisy += sample.measurement != sample.output ? 1 : 0;
+                     })
+          .value();
+      EXPECT_EQ(wrong, 0);
+      EXPECT_EQ(noisy, noise > 0 ? 200 : 0);
+    }
+  }
+}
+
 }  // namespace sim_run_test

@@ -263,7 +263,7 @@ class ControlLoop {
         if (special_ || !detail::LaneAccess::advance(observer_)) [[unlikely]]
           return step_seldom<false>(measured, drive, law);
         if (!detail::LaneAccess::step(observer_, measured, drive)) [[unlikely]]
-          return step_seldom<true>(measured, drive, law);
+          return step_seldom<detail::LaneAccess::advances<Observer>>(measured, drive, law);
         status_ = StepStatus::ok;
         return limited(actuated(law(false)));
       }

@@ -214,13 +214,14 @@ class Limiter {
   static constexpr S larger(const S& a, const S& b) noexcept { return detail::upper_one(a, b); }
 
   S waiting_{};  ///< part of the steps so far that the digits of the output could not hold
+  // Only with a limit of rate; what every output needs is at the end.
   S lower_;
   S upper_;
   S step_;
+  S commanded_{};  ///< kept with a rate limit, or where held_ is another and nobody keeps it
   S held_{};
   S low_;
   S high_;
-  S commanded_{};  ///< kept with a rate limit, or where held_ is another and nobody keeps it
   Lanes<bool, S> rate_limited_;
   Lanes<bool, S> waits_{};  ///< whether the digits of some u do not hold a step
 };

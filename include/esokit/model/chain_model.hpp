@@ -34,10 +34,10 @@ requires(detail::is_a_scalar<S>()) class ChainModel {
   /// @param input_gain b0, unit of y^(n) per unit of u @param sample_time T, s; both already
   /// checked
   constexpr ChainModel(const S& input_gain, const S& sample_time) noexcept
-      : scaled_input_gain_(Chain::scaled_input_gain(input_gain, sample_time)),
-        rate_(S(1.0) / sample_time),
+      : sample_time_(sample_time),
         input_gain_(input_gain),
-        sample_time_(sample_time) {}
+        rate_(S(1.0) / sample_time),
+        scaled_input_gain_(Chain::scaled_input_gain(input_gain, sample_time)) {}
 
   /// b0, unit of y^(n) per unit of u, as it was given.
   [[nodiscard]] constexpr const S& input_gain() const noexcept { return input_gain_; }
@@ -169,10 +169,10 @@ requires(detail::is_a_scalar<S>()) class ChainModel {
     return !all(detail::absolute(S(rate_ - other.rate_)) > S(0.0));
   }
 
-  S scaled_input_gain_;
-  S rate_;  ///< 1/T
-  S input_gain_;
   S sample_time_;
+  S input_gain_;
+  S rate_;               ///< 1/T
+  S scaled_input_gain_;  ///< used in every sample
 };
 
 }  // namespace esokit
