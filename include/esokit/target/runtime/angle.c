@@ -52,7 +52,10 @@ static void forget_turns(esokit_state *o)
 
 static bool restart(esokit_state *o, real y)
 {
-  const bool good = can_be_told(y) && restart_plain(o, wrapped(y));
+  bool good = can_be_told(y);
+  if (good) {
+    good = restart_plain(o, wrapped(y));
+  }
   if (good) {
     forget_turns(o);
 #if ESOKIT_GATED

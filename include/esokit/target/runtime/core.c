@@ -39,14 +39,18 @@ static unsigned update_core(esokit_state *o, real y, real u)
   status = predict_core(o, u);
   return status | correct_core(o, y);
 #else
+  bool done = false;
 #if ESOKIT_SCHEDULE || ESOKIT_FILTER
   law_advance(o);
 #endif
 #if ESOKIT_RECOVERS
-  if ((o->gap == 0u) && (o->due == 0u) && observe(o, y, u)) {
+  if ((o->gap == 0u) && (o->due == 0u)) {
 #else
-  if ((o->gap == 0u) && observe(o, y, u)) {
+  if (o->gap == 0u) {
 #endif
+    done = observe(o, y, u);
+  }
+  if (done) {
 #if ESOKIT_SCHEDULE || ESOKIT_FILTER
     law_accept(o);
 #endif

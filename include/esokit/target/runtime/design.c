@@ -24,11 +24,16 @@ static bool correct_after(esokit_state *o, real y, unsigned elapsed)
 #if ESOKIT_GAIN_IS_KEPT
   return correct_by(o, y, DESIGN_K);
 #else
-  return (elapsed > 1u) ? correct_by(o, y, DESIGN_K) : correct_step(o, y);
+  if (elapsed > 1u) {
+    return correct_by(o, y, DESIGN_K);
+  }
+  return correct_step(o, y);
 #endif
 #elif ESOKIT_SCHEDULE
-  return (elapsed > 1u) ? correct_long(o, y, poles_over(o, elapsed), (real)elapsed)
-                        : correct_step(o, y);
+  if (elapsed > 1u) {
+    return correct_long(o, y, poles_over(o, elapsed), (real)elapsed);
+  }
+  return correct_step(o, y);
 #else
   (void)elapsed;
   return correct_step(o, y);
@@ -43,7 +48,10 @@ static bool arm_after(esokit_state *o, unsigned gap)
   const unsigned row = elapsed - 1u;
   return arm_by(o, DESIGN_K);
 #elif ESOKIT_SCHEDULE
-  return (gap > 1u) ? arm_long(o, poles_over(o, gap), (real)gap) : arm_by(o);
+  if (gap > 1u) {
+    return arm_long(o, poles_over(o, gap), (real)gap);
+  }
+  return arm_by(o);
 #else
   (void)gap;
   return arm_by(o);

@@ -116,7 +116,8 @@ static unsigned predict_standing(esokit_state *o, real u)
     unsigned i;
     expected = predicted_from(o, x, o->u_applied);
     for (i = 1u; i < ORDER; ++i) {
-      if ((x[i] < 0.0) || (x[i] > 0.0)) {
+      const real state = x[i];
+      if ((state < 0.0) || (state > 0.0)) {
         o->unsettled = 1u;
       }
     }
@@ -131,8 +132,11 @@ static unsigned correct_standing(esokit_state *o, real y)
 {
   real before[LEVELS];
   const unsigned elapsed = (o->gap > 1u) ? o->gap : 1u;
-  const real left = is_overdue(o) ? 1.0 : (1.0 - gains_of[elapsed - 1u][0]);
+  real left = 1.0;
   unsigned status;
+  if (!is_overdue(o)) {
+    left = 1.0 - gains_of[elapsed - 1u][0];
+  }
   get_disturbance(o, before);
   status = correct_outside(o, y);
   if (!refused(status)) {
@@ -251,7 +255,9 @@ bool esokit_set_input_gain(esokit_state *o, real b)
   const real factor = 1.0 / ratio;
   bool good = is_finite(b) && is_finite(ratio) && is_finite(factor) && (ratio > 0.0);
 #if ESOKIT_BOUND_OF_U
-  good = good && scale_found(o, ratio * o->input_factor);
+  if (good) {
+    good = scale_found(o, ratio * o->input_factor);
+  }
 #endif
   if (good) {
     o->gain_ratio = ratio;

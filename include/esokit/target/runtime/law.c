@@ -54,8 +54,10 @@ static void law_advance(esokit_state *o)
     schedule_anchor(o, (LAW_START + o->age) - 1u);
   }
   (void)schedule_next(o);
-  if ((o->age > LEAST_AGE) && schedule_settle(o)) {
-    o->settled = 1u;
+  if (o->age > LEAST_AGE) {
+    if (schedule_settle(o)) {
+      o->settled = 1u;
+    }
   }
 }
 
@@ -112,8 +114,12 @@ static void law_advance(esokit_state *o)
     o->since = 0u;
     (void)filter_corrected(o);
   } else {
+    bool stands = before == 4u;
     o->since = 4u;
-    if (!((before == 4u) && filter_at_ceiling(o))) {
+    if (stands) {
+      stands = filter_at_ceiling(o);
+    }
+    if (!stands) {
       (void)filter_missed(o);
     }
   }

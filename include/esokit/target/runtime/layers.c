@@ -66,7 +66,10 @@ static unsigned update_outside(esokit_state *o, real y, real u)
 static bool rest_outside(esokit_state *o, real y, real u)
 {
 #if ESOKIT_WRAPPED
-  const bool good = can_be_told(y) && rest_at(o, y, u, wrapped(y));
+  bool good = can_be_told(y);
+  if (good) {
+    good = rest_at(o, y, u, wrapped(y));
+  }
 #else
   const bool good = rest_at(o, y, u);
 #endif

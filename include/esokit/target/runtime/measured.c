@@ -42,10 +42,11 @@ static real effect_of_w(const esokit_state *o)
 static void advance_w(esokit_state *o, unsigned i)
 {
   const real most = FOUR_PER_W * o->w[i].given;
+  const real effect = w_gain[i] * most;
   real passed = 0.0;
   (void)course_of_w(o, i, &passed);
   o->w[i].lagged = passed;
-  if ((o->w_is_new != 0u) && is_finite(most) && is_finite(w_gain[i] * most)) {
+  if ((o->w_is_new != 0u) && is_finite(most) && is_finite(effect)) {
     o->w[i].last = o->w[i].given;
     o->w[i].lost = 0u;
   } else if (o->w[i].lost <= 65535u) {
@@ -54,7 +55,10 @@ static void advance_w(esokit_state *o, unsigned i)
     /* It has been lost for long. */
   }
   o->w[i].newest = next_place(o->w[i].newest, w_last[i]);
-  o->w[i].memory[o->w[i].newest] = (o->w[i].lost > W_MOST_LOST) ? 0.0 : o->w[i].last;
+  o->w[i].memory[o->w[i].newest] = 0.0;
+  if (o->w[i].lost <= W_MOST_LOST) {
+    o->w[i].memory[o->w[i].newest] = o->w[i].last;
+  }
 }
 
 /* After a prediction. */
@@ -69,8 +73,10 @@ static void advance_measured(esokit_state *o)
   o->w_is_new = 0u;
   now = effect_of_w(o);
   more = now - o->w_told;
-  if (((more < 0.0) || (more > 0.0)) && load(o, more)) {
-    o->w_told = now;
+  if ((more < 0.0) || (more > 0.0)) {
+    if (load(o, more)) {
+      o->w_told = now;
+    }
   }
 }
 

@@ -41,7 +41,10 @@ static void recover(esokit_state *o, unsigned elapsed)
   const uint32_t more = recovery_of[elapsed - 1u];
   const uint32_t due = (uint32_t)o->due + more;
   if ((o->due < 65535u) && (due > 0u)) { /* else it is more than can be counted: until a restart */
-    o->due = (due < 65536u) ? (uint16_t)(due - 1u) : 65535u;
+    o->due = 65535u;
+    if (due < 65536u) {
+      o->due = (uint16_t)(due - 1u);
+    }
   }
 }
 
@@ -53,7 +56,10 @@ static void recover_anew(esokit_state *o)
 #if ESOKIT_RECOVERS
   const uint16_t most = recovery_of[LAST_ROW];
   if (o->due != 0u) {
-    o->due = (most > 0u) ? (uint16_t)(most - 1u) : 0u;
+    o->due = 0u;
+    if (most > 0u) {
+      o->due = (uint16_t)(most - 1u);
+    }
   }
 #else
   (void)o;
@@ -63,7 +69,10 @@ static void recover_anew(esokit_state *o)
 #endif
 static bool restart_plain(esokit_state *o, real y)
 {
-  const bool good = is_finite(y) && restart_at(o, y);
+  bool good = is_finite(y);
+  if (good) {
+    good = restart_at(o, y);
+  }
   if (good) {
     up_to_date(o);
 #if ESOKIT_SCHEDULE || ESOKIT_FILTER
@@ -116,8 +125,10 @@ static unsigned correct_plain(esokit_state *o, real y)
     if (elapsed > 1u) {
       status = ESOKIT_GAP_BRIDGED;
     }
-  } else if ((fabs(y) < fabs(o->DESIGN_Y)) && restart_plain(o, y)) { /* the state was to blame */
-    status = ESOKIT_RESTARTED;
+  } else if (fabs(y) < fabs(o->DESIGN_Y)) { /* the state was to blame */
+    if (restart_plain(o, y)) {
+      status = ESOKIT_RESTARTED;
+    }
   } else {
     /* y is refused. */
   }
