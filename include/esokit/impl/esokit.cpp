@@ -39,7 +39,6 @@
 #include <esokit/sim/impl/statistics.ipp>
 #include <esokit/sim/impl/study_records.ipp>
 #include <esokit/target/impl/c_code.ipp>
-#include <esokit/target/impl/c_design.ipp>
 #include <esokit/target/impl/fixed_bounds.ipp>
 #include <esokit/target/impl/fixed_builder.ipp>
 #include <esokit/target/impl/fixed_design.ipp>

@@ -57,6 +57,14 @@ struct WrittenCall {
   std::vector<std::string> unused{};                           ///< arguments
 };
 
+/// What `one` makes of each, with commas.
+template <class All, class One>
+std::string listed(const All& all, const One& one) {
+  std::string text;
+  for (const auto& each : all) text += (text.empty() ? "" : ", ") + one(each);
+  return text;
+}
+
 /// Writes recorded calls line by line.
 class ListWriter {
  public:
@@ -70,6 +78,18 @@ class ListWriter {
   [[nodiscard]] bool single() const { return single_; }
   /// The number, read back bit for bit.
   [[nodiscard]] std::string number(double value) const;
+  /// `{1.0, 2.0}`
+  template <class Numbers>
+  [[nodiscard]] std::string numbers(const Numbers& all) const {
+    return "{" + listed(all, [&](auto x) { return number(static_cast<double>(x)); }) + "}";
+  }
+  /// The same, a line for each.
+  template <class Rows>
+  [[nodiscard]] std::string rows(const Rows& all) const {
+    std::string text;
+    for (const auto& row : all) text += "    " + numbers(row) + ",\n";
+    return text;
+  }
 
   /// Which instructions are needed for checks, outputs and live numbers.
   [[nodiscard]] std::vector<bool> needed(const RecordedCall& call) const;

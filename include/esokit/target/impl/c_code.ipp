@@ -1,18 +1,458 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
+#include <cstddef>
 #include <cstdint>
-#include <esokit/core/expected.hpp>
 #include <esokit/target/c_code.hpp>
 #include <esokit/target/c_design.hpp>
 #include <esokit/target/list_writer.hpp>
 #include <esokit/target/recorded_design.hpp>
-#include <esokit/target/writable.hpp>
+#include <esokit/target/recorded_numbers.hpp>
+#include <esokit/target/runtime_text.hpp>
+#include <limits>
 #include <string>
+#include <vector>
 
-namespace esokit {
+namespace esokit::detail {
 
-namespace detail {
+/// `static bool name(state *o, arguments, *u)`: true, or false if a check does not hold; then
+/// nothing has changed.
+inline std::string c_function(const ListWriter& writer, const std::string& prefix,
+                              const NamedCall& names, const RecordedCall& call) {
+  const WrittenCall lines = writer.written(names, call);
+  std::string text = "static bool " + names.name + "(" + (lines.results.empty() ? "const " : "") +
+                     prefix + "_state *o";
+  for (const auto& argument : names.arguments) text += ", " + writer.real() + " " + argument;
+  if (names.has_output) text += ", " + writer.real() + " *u_out";
+  text += ")\n{\n";
+  for (const auto* part : {&lines.reads, &lines.lines}) {
+    for (const auto& line : *part) {
+      text += std::string("  const ") + (line.is_condition ? "bool" : writer.real()) + " " +
+              line.name + " = " + line.expression + ";\n";
+    }
+  }
+  for (const auto& argument : lines.unused) text += "  (void)" + argument + ";\n";
+  for (const auto& check : lines.checks)
+    text += "  if (!" + check + ") {\n    return false;\n  }\n";
+  for (const auto& [member, value] : lines.results) {
+    text += "  o->" + member + " = " + value + ";\n";
+  }
+  if (lines.results.empty() && lines.reads.empty()) text += "  (void)o;\n";
+  if (names.has_output) text += "  *u_out = " + lines.output + ";\n";
+  return text + "  return true;\n}\n\n";
+}
+
+/// What is known is computed by functions of the C library, whose last bits are its own.
+inline std::string c_library_calls(const RecordedDesign& design) {
+  std::string names;
+  for (int at = static_cast<int>(Operation::power);
+       at <= static_cast<int>(Operation::hyperbolic_tangent); ++at) {
+    const auto is_it = [at](const Instruction& one) {
+      return static_cast<int>(one.operation) == at;
+    };
+    const bool used = std::any_of(design.calls.begin(), design.calls.end(), [&](const auto& call) {
+      const auto& list = call.list.instructions;
+      return std::any_of(list.begin(), list.end(), is_it);
+    });
+    if (!used) continue;
+    const std::string call = c_language.of[static_cast<std::size_t>(at)];
+    names +=
+        (names.empty() ? "" : ", ") + call.substr(0, call.find('$')) + (design.single ? "f" : "");
+  }
+  return names;
+}
+
+/// What the C of a design has beside the files of target/runtime/: its features, numbers and lists.
+class CDesign {
+ public:
+  /// @param mark of its text, if settings can be changed
+  CDesign(const RecordedDesign& design, const std::string& mark)
+      : design_(design),
+        writer_(c_language, design.single),
+        text_(design.options.name, design.single) {
+    writer_.members = design.members;
+    writer_.live = design.live;
+    writer_.settings = design.settings;
+    set_features();
+    set_features_of_adapters();
+    set_constants();
+    set_constants_of_adapters();
+    if (design.guard.on) set_guard();
+    if (design.measured.on) set_measured();
+    set_map();
+    set_rows();
+    set_state();
+    set_words();
+    if (design.options.settings_in_struct) {
+      text_.constant("DESIGN_MARK", mark);
+      settings_ = settings(mark);
+      text_.lines("DESIGN_SET_OF_SETTINGS", settings_);
+    }
+  }
+
+  /// `name.h`.
+  [[nodiscard]] std::string header() { return text_.header(runtime::header); }
+
+  /// `name.c`.
+  [[nodiscard]] std::string source() {
+    text_.lines("DESIGN_LISTS", "");
+    const std::string shell = text_.parts(runtime::source);
+    std::string lists;
+    for (std::size_t i = 0; i < design_.names.size(); ++i) {
+      const NamedCall& names = design_.names[i];
+      if (!RuntimeText::uses(shell, names.name + "(o")) continue;
+      lists += c_function(writer_, design_.options.name, names, design_.calls[i]);
+    }
+    text_.lines("DESIGN_LISTS", lists);
+    return text_.source(runtime::source);
+  }
+
+  /// The settings for a file of their own.
+  [[nodiscard]] std::string settings_file() const {
+    if (settings_.empty()) return "";
+    return "#include \"" + design_.options.name + ".h\"\n\n" + settings_;
+  }
+
+ private:
+  void number(const char* name, double value) { text_.constant(name, writer_.number(value)); }
+
+  void set_features() {
+    const RecordedDesign& d = design_;
+    const bool gains_stand = d.law.kind == RunningLaw::none;
+    text_.feature("ESOKIT_CONTROLLER", d.is_controller);
+    text_.feature("ESOKIT_PREDICTIVE", d.predictive);
+    text_.feature("ESOKIT_WAITS", d.predictive && d.waits);
+    text_.feature("ESOKIT_ERROR_BASED", d.error_based);
+    text_.feature("ESOKIT_COMPENSATOR", d.compensates);
+    text_.feature("ESOKIT_SOFTENS", d.softens);
+    text_.feature("ESOKIT_DIVIDED", d.loop.divider > 1);
+    text_.feature("ESOKIT_STAYS_SAFE", d.loop.stays_safe);
+    text_.feature("ESOKIT_HOLDS_SAFE", d.loop.holds_safe);
+    text_.feature("ESOKIT_MONITORED", d.options.watched);
+    text_.feature("ESOKIT_SETTINGS", d.options.settings_in_struct);
+    text_.feature("ESOKIT_TABLE", gains_stand);
+    text_.feature("ESOKIT_RECOVERS", d.recovers);
+    text_.feature("ESOKIT_GAIN_IS_KEPT", gains_stand && d.gain_is_kept);
+    text_.feature("ESOKIT_SCHEDULE", d.law.kind == RunningLaw::schedule);
+    text_.feature("ESOKIT_FILTER", d.law.kind == RunningLaw::filter);
+    text_.feature("ESOKIT_RETURNS", d.law.returns);
+    text_.feature("ESOKIT_WATCHED", d.law.watches);
+  }
+
+  void set_features_of_adapters() {
+    const RecordedDesign& d = design_;
+    text_.feature("ESOKIT_DELAYED", !d.line.empty());
+    text_.feature("ESOKIT_GATED", d.gate.threshold > 0);
+    text_.feature("ESOKIT_WRAPPED", d.wrap.period > 0);
+    text_.feature("ESOKIT_GATED_ANGLE", d.wrap.gated);
+    text_.feature("ESOKIT_LAW_OF_ANGLE", d.is_controller && !d.wrap.angle.empty());
+    text_.feature("ESOKIT_KNOWN", d.known.on);
+    text_.feature("ESOKIT_MAPPED", !d.map.lines.empty());
+    text_.feature("ESOKIT_MEASURED", d.measured.on);
+    text_.feature("ESOKIT_ONE_W", d.measured.paths.size() == 1);
+    text_.feature("ESOKIT_GUARDED", d.guard.on);
+    text_.feature("ESOKIT_BOUNDED", d.guard.bound > 0);
+    text_.feature("ESOKIT_BOUND_OF_U", d.guard.by_input);
+    text_.feature("ESOKIT_LEAKS", d.guard.leak > 0);
+  }
+
+  void set_constants() {
+    const RecordedDesign& d = design_;
+    number("SAMPLE_TIME", d.sample_time);
+    number("LARGEST", d.single ? static_cast<double>((std::numeric_limits<float>::max)())
+                               : (std::numeric_limits<double>::max)());
+    const auto bridged = static_cast<std::size_t>(d.max_gap) + 1;
+    const std::size_t rows = d.recovery.empty() ? bridged : d.recovery.size();
+    text_.count("ROWS", rows);
+    text_.count("LAST_ROW", rows - 1);
+    text_.count("MAX_BRIDGED", bridged);
+    text_.count("STATES", static_cast<std::size_t>(d.size));
+    text_.count("ORDER", static_cast<std::size_t>(d.order));
+    text_.constant("SAMPLES", std::to_string(d.samples.size()));
+    text_.count("DIVIDER", static_cast<std::size_t>(d.loop.divider));
+    text_.count("MISSING_LIMIT", d.loop.missing_limit);
+    text_.count("HOLD_SAMPLES", d.predictive ? d.hold : d.loop.hold_left);
+    const bool holds = d.predictive ? d.hold > 0 : d.loop.hold_left > 0;
+    text_.feature("ESOKIT_HOLDS_AT_START", holds);
+    text_.constant("FIRST_MODE", holds ? "1u" : "0u");
+    text_.constant("FIRST_PHASE", d.loop.elsewhere ? "5u" : "0u");
+    text_.constant("FIRST_ELSEWHERE", d.loop.elsewhere ? "1u" : "0u");
+    number("FIRST_KEPT", d.loop.kept);
+    number("HOLD_INPUT", d.loop.hold_input);
+    number("SAFE_INPUT", d.loop.safe_input);
+    text_.count("LAW_START", d.law.start);
+    text_.count("LEAST_AGE", d.law.least_age);
+    number("DECAY", d.law.decay);
+    number("SHIFT", d.law.shift);
+    number("CONTRACTION", d.law.contraction);
+  }
+
+  void set_constants_of_adapters() {
+    const RecordedDesign& d = design_;
+    text_.count("DELAY", d.line.empty() ? 0 : d.line.size() - 1);
+    text_.count("LENGTH", d.line.size());
+    number("GATE_FACTOR", d.gate.running_factor);
+    number("GATE_THRESHOLD", d.gate.threshold);
+    text_.count("GATE_MOST", d.gate.most_in_a_row);
+    number("PERIOD", d.wrap.period);
+    number("PER_PERIOD", d.wrap.inverse_period);
+    number("HALF_PERIOD", d.wrap.period * 0.5);
+    number("QUARTER_PERIOD", d.wrap.period * 0.25);
+    number("MOST_TURNS", d.wrap.most_turns);
+  }
+
+  void set_guard() {
+    const GuardNumbers& guard = design_.guard;
+    number("DISTURBANCE_BOUND", guard.bound);
+    number("BOUND_OF_U", guard.bound_as_given);
+    number("INPUT_GAIN", guard.gain);
+    number("PER_INPUT_GAIN", guard.inverse_gain);
+    number("LEAK", guard.leak);
+    text_.count("LEVELS", static_cast<std::size_t>(guard.levels));
+    text_.count("SETTLING", guard.settling_samples);
+    text_.count("RELEASE", guard.release_samples);
+    text_.count("UP_SIDE", guard.gain > 0 ? 1 : 2);
+    text_.count("DOWN_SIDE", guard.gain > 0 ? 2 : 1);
+    const auto found = [&](int level) {
+      return "o->z" + std::to_string(design_.order + 1) +
+             (level > 0 ? "_level" + std::to_string(level + 1) : std::string());
+    };
+    const auto state = [](int row) { return "o->z" + std::to_string(row + 1); };
+    text_.lines("DESIGN_GET_D", each(guard.levels, [&](int i) {
+                  return "  " + at("d", i) + " = " + found(i) + ";\n";
+                }));
+    text_.lines("DESIGN_SET_D", each(guard.levels, [&](int i) {
+                  return "  " + found(i) + " = " + at("d", i) + ";\n";
+                }));
+    text_.lines("DESIGN_GET_X", each(design_.size, [&](int i) {
+                  return "  " + at("x", i) + " = " + state(i) + ";\n";
+                }));
+    text_.replace("DESIGN_X", counted(design_.size, [](int i) { return at("x", i); }));
+    text_.replace("DESIGN_D", counted(guard.levels, [](int i) { return at("d", i); }));
+  }
+
+  void set_measured() {
+    const MeasuredNumbers& measured = design_.measured;
+    std::size_t most = 0;
+    for (const auto& path : measured.paths) most = (std::max)(most, path.memory.size());
+    const auto of_paths = [&](const char* name, const auto& of) {
+      text_.replace(name, listed(measured.paths, of));
+    };
+    of_paths("DESIGN_W_GAINS", [&](const auto& path) { return writer_.number(path.gain); });
+    of_paths("DESIGN_W_SHARES", [&](const auto& path) { return writer_.numbers(path.share); });
+    of_paths("DESIGN_W_LATES", [&](const auto& path) { return writer_.numbers(path.late); });
+    of_paths("DESIGN_W_REACHED", [&](const auto& path) { return writer_.numbers(path.reached); });
+    of_paths("DESIGN_W_LAST",
+             [](const auto& path) { return std::to_string(path.memory.size() - 1) + "u"; });
+    text_.count("W_COUNT", measured.paths.size());
+    text_.count("W_LENGTH", most);
+    text_.count("W_MOST_LOST", measured.most_lost);
+    number("FOUR_PER_W", 4.0 * static_cast<double>(measured.paths.size()));
+  }
+
+  void set_map() {
+    const MapNumbers& map = design_.map;
+    text_.lines("DESIGN_MAP_ENDS", writer_.rows(std::array{map.inputs, map.effects}));
+    text_.lines("DESIGN_MAP_LINES", writer_.rows(map.lines));
+    text_.count("MAP_POINTS", map.inputs.size());
+    text_.count("MAP_LINES", map.lines.size());
+  }
+
+  void set_rows() {
+    const auto by_row = [&](const std::string& indent, const auto& line) {
+      return each(design_.size, [&](int i) {
+        const std::string row = std::to_string(i);
+        return indent + "if (row == " + row + "u) {\n" + indent + "  " + line(row) + "\n" + indent +
+               "}\n";
+      });
+    };
+    text_.lines("DESIGN_ESTIMATES", by_row("  ", [](const std::string& row) {
+                  return "(void)estimate_" + row + "(o, &x);";
+                }));
+    text_.lines("DESIGN_PUBLISHED", by_row("    ", [](const std::string& row) {
+                  return "x = o->published_" + row + ";";
+                }));
+    text_.replace("DESIGN_ALL_ESTIMATES", counted(design_.size, [](int i) {
+                    return "estimate_at(o, " + std::to_string(i) + "u)";
+                  }));
+    if (design_.gap_gains.empty()) return;
+    const auto gains = static_cast<int>(design_.gap_gains[0].size());
+    text_.constant("GAINS", std::to_string(gains));
+    const std::string row =
+        design_.options.settings_in_struct ? "o->settings->gains[row][" : "gains[row][";
+    text_.replace("DESIGN_K", counted(gains, [&](int i) { return row + std::to_string(i) + "]"; }));
+    text_.lines("DESIGN_GAINS", writer_.rows(design_.gap_gains));
+    text_.lines("DESIGN_RECOVERY", "    " + recovery() + "\n");
+  }
+
+  void set_state() {
+    const RecordedDesign& d = design_;
+    std::string members;
+    std::string settings;
+    if (d.options.settings_in_struct) {
+      set("settings", "&" + d.options.name + "_" + d.options.settings_name);
+    }
+    for (std::size_t i = 0; i < d.members.size(); ++i) {
+      if (!d.live[i]) continue;
+      const bool is_setting = !d.settings.empty() && d.settings[i];
+      (is_setting ? settings : members) += "  " + writer_.real() + " " + d.members[i] + ";\n";
+      if (!is_setting) set(d.members[i], writer_.number(d.numbers[i]));
+    }
+    set_adapters();
+    text_.lines("DESIGN_MEMBERS", members);
+    text_.lines("DESIGN_SETTINGS", settings);
+    text_.lines("DESIGN_INIT", init_);
+  }
+
+  void set(const std::string& name, const std::string& value) {
+    init_ += "  o->" + name + " = " + value + ";\n";
+  }
+  void real(const std::string& name, double value) { set(name, writer_.number(value)); }
+  void count(const std::string& name, std::size_t value) { set(name, std::to_string(value) + "u"); }
+  void ring(const std::string& name, const std::vector<double>& numbers) {
+    for (std::size_t i = 0; i < numbers.size(); ++i)
+      real(name + "[" + std::to_string(i) + "]", numbers[i]);
+  }
+
+  /// What adapters and laws remember of the object.
+  void set_adapters() {
+    const RecordedDesign& d = design_;
+    if (!d.line.empty()) {
+      ring("line", d.line);
+      count("newest", d.line.size() - 1);
+    }
+    if (d.gate.threshold > 0) {
+      real("gate_mean", d.gate.mean);
+      count("gate_count", d.gate.count);
+      count("gate_open", d.gate.open ? 1 : 0);
+    }
+    for (std::size_t w = 0; w < d.measured.paths.size(); ++w) {
+      const MeasuredPathNumbers& path = d.measured.paths[w];
+      const std::string of = "w[" + std::to_string(w) + "].";
+      ring(of + "memory", path.memory);
+      real(of + "given", 0);
+      real(of + "last", path.last);
+      real(of + "lagged", path.lagged);
+      count(of + "lost", path.lost);
+      count(of + "newest", path.memory.size() - 1);
+    }
+    if (d.measured.on) {
+      real("w_told", d.measured.told);
+      count("w_is_new", 0);
+    }
+    if (d.law.kind == RunningLaw::schedule) {
+      count("age", d.law.age);
+      count("pending", d.law.pending ? 1 : 0);
+      count("settled", d.law.settled ? 1 : 0);
+    }
+    if (d.law.kind == RunningLaw::filter) count("since", d.law.since);
+    if (d.wrap.period > 0) set_turns();
+    if (d.guard.on) set_found();
+  }
+
+  void set_turns() {
+    const WrapNumbers& wrap = design_.wrap;
+    const auto add = [&](const std::string& of, const TurnNumbers& turns) {
+      real(of + "angle", turns.y);
+      real(of + "turns", turns.turns);
+      real(of + "motion", turns.motion);
+      count(of + "motion_samples", turns.samples);
+      count(of + "gaps", turns.gaps);
+      count(of + "doubts", turns.doubts);
+      count(of + "begun", turns.begun ? 1 : 0);
+    };
+    add("taken.", wrap.count);
+    if (!wrap.gated) return;
+    add("heard.", wrap.heard);
+    count("heard_at", wrap.heard_at);
+    count("heard_steady", wrap.heard_steady);
+    count("heard_rejected", wrap.heard_rejected);
+  }
+
+  void set_found() {
+    const GuardNumbers& guard = design_.guard;
+    real("trust", guard.trust);
+    real("weight_up", guard.weight_up);
+    real("weight_down", guard.weight_down);
+    real("gain_ratio", guard.gain_ratio);
+    real("told_ratio", guard.told_ratio);
+    real("input_factor", guard.input_factor);
+    count("settling_left", guard.settling_left);
+    count("release_left", guard.release_left);
+    count("pin", guard.pin);
+    count("side", guard.side);
+    count("held", guard.held ? 1 : 0);
+    count("unsettled", guard.unsettled ? 1 : 0);
+    count("frozen", guard.frozen ? 1 : 0);
+    count("gated", guard.gated ? 1 : 0);
+  }
+
+  void set_words() {
+    const RecordedDesign& d = design_;
+    const CodeOptions& options = d.options;
+    std::string about = options.comment.empty() ? "" : " * " + options.comment + "\n";
+    about += " * T = " + writer_.number(d.sample_time) + " s, b0 = " + writer_.number(d.input_gain);
+    if (d.is_controller && !options.settings_in_struct) {
+      about += ", u within " + writer_.number(d.lower) + " .. " + writer_.number(d.upper);
+    }
+    text_.lines("DESIGN_ABOUT", about + ".\n");
+    const std::string calls = c_library_calls(d);
+    text_.replace("DESIGN_EXACTLY",
+                  d.known.on && !calls.empty()
+                      ? "bit for bit,\n * where the C library has the same " + calls
+                      : "bit for bit");
+    text_.replace("DESIGN_Y", d.first_state);
+    text_.replace("DESIGN_ANGLE", d.wrap.angle);
+    text_.replace("esokit_DESIGN_SET", options.name + "_" + options.settings_name);
+    text_.replace("DESIGN_REFERENCE",
+                  d.compensates ? "the u0 of the controller that is helped" : "the reference");
+    text_.replace("DESIGN_LAST", std::to_string(d.size - 1));
+    text_.replace("DESIGN_COLUMNS", d.predictive      ? "y, next r, u"
+                                    : d.is_controller ? "y, r, u"
+                                                      : "y, u, the disturbance");
+    text_.lines("DESIGN_VECTORS", writer_.rows(d.samples));
+  }
+
+  std::string recovery() const {
+    return listed(design_.recovery, [](unsigned due) { return std::to_string(due) + "u"; });
+  }
+  std::string settings(const std::string& mark) const {
+    const CodeOptions& options = design_.options;
+    std::string set = "const " + options.name + "_settings " + options.name + "_" +
+                      options.settings_name + " = {\n  " + mark;
+    for (std::size_t i = 0; i < design_.members.size(); ++i) {
+      if (design_.live[i] && design_.settings[i]) {
+        set += ",\n  " + writer_.number(design_.numbers[i]);
+      }
+    }
+    set += ",\n  {\n" + writer_.rows(design_.gap_gains) + "  }";
+    if (design_.recovers) {
+      set += ",\n  {" + recovery() + "},\n  " + std::to_string(design_.max_gap + 1) + "u";
+    }
+    return set + "\n};\n\n";
+  }
+
+  static std::string at(const char* name, int i) {
+    return std::string(name) + "[" + std::to_string(i) + "]";
+  }
+  template <class One>
+  static std::string each(int count, const One& one) {
+    std::string text;
+    for (int i = 0; i < count; ++i) text += one(i);
+    return text;
+  }
+  template <class One>
+  static std::string counted(int count, const One& one) {
+    return each(count, [&](int i) { return (i > 0 ? ", " : "") + one(i); });
+  }
+
+  const RecordedDesign& design_;
+  ListWriter writer_;
+  RuntimeText text_;
+  std::string init_{};
+  std::string settings_{};
+};
 
 /// The texts of a design. @param mark of its text, if settings can be changed
 inline CCode c_texts(const RecordedDesign& design, const std::string& mark) {
@@ -40,5 +480,4 @@ ESOKIT_FUNCTION CCode c_code(const RecordedDesign& design) {
   return c_texts(design, std::to_string(mark) + "u");
 }
 
-}  // namespace detail
-}  // namespace esokit
+}  // namespace esokit::detail

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -282,7 +283,12 @@ class FixedText {
     text_.count("COUNTER_MASK", 2 * half - 1);
     text_.count("STATES", d_.states());
     text_.count("COLUMNS", d_.states() + 1);
-    text_.count("ROWS", static_cast<std::size_t>(d_.table_rows()));
+    const auto rows = static_cast<std::size_t>(d_.table_rows());
+    text_.count("ROWS", rows);
+    // Of 16 bits, as the count is.
+    text_.count("GAP_MOST",
+                (std::min)((std::max)(rows + 1, std::size_t{design_.loop.missing_limit}),
+                           std::size_t{65535}));
     text_.count("GAINS", gains_.size());
     text_.constant("SAMPLES", std::to_string(design_.options.self_test_samples));
   }

@@ -122,7 +122,7 @@ static unsigned predict_slowly(esokit_state *o, int32_t given)
   } else {
     /* u is good. */
   }
-  if (o->gap < 65535u) {
+  if (o->gap != GAP_MOST) { /* beyond which nothing depends on it */
     o->gap = (uint16_t)(o->gap + 1u);
   }
   return status | moved(o, m, powers, u, reach_of);
@@ -142,7 +142,7 @@ static unsigned correct_slowly(esokit_state *o, y_count given, int32_t u)
   unsigned status = ESOKIT_MEASUREMENT_REJECTED;
   unsigned elapsed = o->gap;
   const int32_t y = counts(o, given);
-  if (elapsed < 1u) {
+  if (elapsed == 0u) {
     elapsed = 1u;
   }
   if (elapsed > ROWS) {

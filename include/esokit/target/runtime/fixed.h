@@ -62,7 +62,7 @@ typedef struct {
   int32_t u_last; /* after the limits, in 2^-LAW_SCALE counts */
   int32_t u_held; /* what the actuator holds, in counts */
   uint32_t hold_left; /* samples of the start hold */
-  uint16_t gap; /* samples since the last measurement that was taken */
+  uint16_t gap; /* samples since the last measurement that was taken, as far as they count */
   uint8_t mode;
   uint8_t status;
 } esokit_state;
@@ -81,7 +81,7 @@ unsigned esokit_applied(esokit_state *o, int32_t u);
 #else
 typedef struct {
   DESIGN_MEMBERS
-  uint16_t gap; /* samples since the last measurement that was taken */
+  uint16_t gap; /* samples since the last measurement that was taken, as far as they count */
 } esokit_state;
 
 /* At rest at DESIGN_ORIGIN. Call it before all else, and then reset. */
