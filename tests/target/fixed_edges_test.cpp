@@ -139,6 +139,42 @@ TEST(FixedEdges, OfAState) {
   EXPECT_EQ(ends[0], -ends[1]);
 }
 
+/// Settings that are taken up in a gap leave a state where a gap can lead it; after a measurement
+/// it is held where one can leave it.
+TEST(FixedEdges, OfSettings) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  const auto object = Eso::make(observer_config()).value();
+  auto options = encoder();
+  options.code.settings_in_struct = true;
+  const auto base = to_fixed_c(object, options).value();
+  options.settings_for = &base;
+  options.code.settings_name = "other";
+  CCode code = base.code;
+  code.source += to_fixed_c(object, options).value().code.settings;
+  const Folder folder;
+  FixedInC<std::int32_t> c(folder, code);
+  ASSERT_TRUE(c.loaded());
+  void* const o = c.state.data();
+  for (const std::int32_t sign : {1, -1}) {
+    for (const int missing : {1, 2, 0}) {
+      EXPECT_EQ(c.reset(o, 0), 0u);
+      std::int32_t& disturbance = c.state[2];
+      disturbance = sign * 2000000000;
+      EXPECT_EQ(c.predict(o, 0), saturated);
+      const std::int32_t end = disturbance;
+      if (missing == 2) {
+        EXPECT_EQ(c.predict(o, 0), 0u);
+      }
+      if (missing == 0) {
+        EXPECT_EQ(c.reset(o, 0), 0u);
+        disturbance = end;
+      }
+      EXPECT_EQ(c.adopt(o, c.other), missing > 0 ? 0u : saturated) << missing;
+      EXPECT_EQ(disturbance == end, missing > 0) << missing;
+    }
+  }
+}
+
 /// A counter moves by so many counts a sample, in a gap too, whatever it stands at.
 TEST(FixedEdges, OfACounter) {
   if (!there("gcc")) GTEST_SKIP() << "no gcc";

@@ -237,7 +237,7 @@ static void judge_missing(esokit_state *o)
     o->mode = ESOKIT_SAFE;
   }
 #if !ESOKIT_STAYS_SAFE
-  if ((o->mode == ESOKIT_SAFE) && (o->gap < 1u)) {
+  if ((o->mode == ESOKIT_SAFE) && (o->gap == 0u)) {
     o->mode = ESOKIT_RUNNING;
   }
 #endif
@@ -325,7 +325,7 @@ int32_t esokit_update(esokit_state *o, y_count given, y_count r)
 #endif
   o->status = 0u;
 #if !ESOKIT_STAYS_SAFE
-  if ((o->mode == ESOKIT_SAFE) && (o->gap < 1u)) {
+  if ((o->mode == ESOKIT_SAFE) && (o->gap == 0u)) {
     o->mode = ESOKIT_RUNNING;
   }
 #endif
