@@ -317,8 +317,10 @@ class LogFile {
     std::string text;
     for (const auto& names : headers_) {
       if (!text.empty()) text += "; also called ";
-      for (std::size_t i = 0; i < std::min(names.size(), most); ++i)
-        text += (i == 0 ? "" : ", ") + names[i];
+      std::size_t shown = 0;
+      for (std::size_t i = 0; i < names.size() && shown < most; ++i) {
+        if (!names[i].empty()) text += (shown++ == 0 ? "" : ", ") + names[i];
+      }
       if (names.size() > most) text += " and " + std::to_string(names.size() - most) + " more";
     }
     return text;
@@ -349,7 +351,13 @@ class LogFile {
     std::string line;
     const auto next = [&](Head& head) {
       while (lines.next(line)) {
+        if (lines.number() == 1) packed_ = line.starts_with("PK") || line.starts_with("\x1f\x8b");
         if (line.find('\0') != std::string::npos) {
+          if (lines.number() < 100 && packed_) {
+            throw LogError(file_.path() +
+                           ": it is packed (a workbook, a zip or gz file), no text: unpack it, or "
+                           "save it as CSV");
+          }
           throw LogError(at(lines.number()) +
                          "it has a zero byte: it is no text, or UTF-16 without its mark; save it "
                          "as UTF-8");
@@ -376,17 +384,25 @@ class LogFile {
     cells_.resize(wanted.size());
     std::size_t shown = 0;
     Fields fields;
+    std::string too_short;  // said of a line that only the last one may be
     const auto take = [&](const Head& head) {
       if (head.comment) return;
+      if (!too_short.empty()) throw LogError(too_short);
       split(head.text, separator_, fields);
       if (!labels_.empty() && std::all_of(fields.begin(), fields.end(),
                                           [](std::string_view field) { return field.empty(); })) {
         ++other_lines_;
         return;
       }
-      if (!head.whole && fields.size() < count_) {
-        cut_ = true;
-        return;
+      if (fields.size() < count_) {
+        const auto lost = std::find_if(places_.begin(), places_.end(), [&](const Place& place) {
+          return place.column >= fields.size();
+        });
+        cut_ = !head.whole || lost != places_.end();
+        if (cut_ && head.whole)
+          too_short =
+              lacking(head.number, fields, static_cast<std::size_t>(lost - places_.begin()));
+        if (cut_) return;
       }
       check_count(head.number, fields);
       for (std::size_t i = 0; i < places_.size(); ++i) {
@@ -471,6 +487,7 @@ class LogFile {
       for (const auto& field : fields)
         headers_[0].emplace_back(parse_stamp(field) ? "time" : label_of(field));
     }
+    if (headers_.empty()) understand_words(heads, text, body, shape);
     count_ = headers_.empty() ? shape.count : headers_[0].size();
     if (!headers_.empty() && separator_ == ' ' && fields.size() != count_) {
       throw LogError(at(heads[begin].number) + "it has " + std::to_string(fields.size()) +
@@ -611,6 +628,32 @@ class LogFile {
       shape.filled += c < shape.count && filled[c] > 0 ? 1 : 0;
     }
     return shape;
+  }
+
+  /// Names in fields of their own, each before its number: t,0.01,PWM,120,Enc1,-44.9
+  void understand_words(const std::vector<Head>& heads, const std::vector<std::size_t>& text,
+                        std::size_t body, const Shape& shape) {
+    Fields fields, last;
+    split(heads[text[body]].text, separator_, last);
+    // The last line may be cut.
+    const auto end = text.end() - (body + 1 < text.size() ? 1 : 0);
+    std::vector<std::string> names(shape.count), words(shape.count);
+    std::size_t named = 0;
+    for (std::size_t c = 0; c + 1 < std::min(shape.count, last.size()); ++c) {
+      if (shape.number[c] || !shape.number[c + 1] || last[c].empty()) continue;
+      const bool same =
+          std::all_of(text.begin() + static_cast<std::ptrdiff_t>(body), end, [&](std::size_t i) {
+            split(heads[i].text, separator_, fields);
+            return c < fields.size() && fields[c] == last[c];
+          });
+      if (!same) return;
+      names[c + 1] = words[c + 1] = last[c];
+      ++named;
+    }
+    // Each number has one.
+    if (named < 2 || named != static_cast<std::size_t>(shape.numbers)) return;
+    headers_.assign(1, names);
+    words_ = words;
   }
 
   enum class Numbers { none, some, all };
@@ -869,16 +912,24 @@ class LogFile {
                                      : "are " + there()));
   }
 
+  /// How a wanted column is called in an error.
+  [[nodiscard]] std::string called(std::size_t wanted) const {
+    return headers_.empty() ? std::to_string(places_[wanted].column + 1) : "'" + name(wanted) + "'";
+  }
+  [[nodiscard]] std::string lacking(std::size_t line, const Fields& fields,
+                                    std::size_t wanted) const {
+    return at(line) + "only " + std::to_string(fields.size()) + " fields, none for " +
+           called(wanted);
+  }
+
   [[nodiscard]] double value(std::size_t line, const Fields& fields, std::size_t wanted) {
     const std::size_t place = places_[wanted].column;
-    const auto column = [&] {
-      return headers_.empty() ? std::to_string(place + 1) : "'" + name(wanted) + "'";
-    };
-    if (place >= fields.size()) {
-      throw LogError(at(line) + "only " + std::to_string(fields.size()) + " fields, none for " +
-                     column());
-    }
+    const auto column = [&] { return called(wanted); };
     std::string_view field = fields[place];
+    if (!words_.empty() && (place == 0 || fields[place - 1] != words_[place])) {
+      throw LogError(at(line) + "'" + std::string(place == 0 ? "" : fields[place - 1]) +
+                     "' stands before column " + column() + " instead of its name");
+    }
     const char* wrong = nullptr;
     if (labelled_) {
       const auto label = label_of(field);
@@ -918,7 +969,7 @@ class LogFile {
       found = *stands_for;
       ++(std::isfinite(found) ? cells.switched : cells.failed);
     } else {
-      wrong = "is not a number";
+      wrong = why_no_number(field);
     }
     if (wrong != nullptr) {
       throw LogError(at(line) + "'" + std::string(fields[place]) + "' in column " + column() + " " +
@@ -926,6 +977,23 @@ class LogFile {
     }
     check_commas(line, field);
     return found;
+  }
+
+  /// What is wrong with a field that is not a number, and what to do.
+  [[nodiscard]] const char* why_no_number(std::string_view field) const {
+    if (!headers_.empty() && std::any_of(headers_.begin(), headers_.end(), [&](const auto& names) {
+          return std::find(names.begin(), names.end(), field) != names.end();
+        }))
+      return "is a name, not a number: a second recording begins here; cut the file";
+    if (field.size() > 2 && field.front() == '\'' && field.back() == '\'')
+      return "is not a number: write it without quotation marks";
+    const bool digits =
+        std::count_if(field.begin(), field.end(), [](char c) { return c >= '0' && c <= '9'; }) > 3;
+    const auto apart = field.find_first_of(" ',");
+    if (digits && apart != std::string_view::npos && apart + 4 <= field.size() &&
+        field.find_first_not_of("+-0123456789.,' ") == std::string_view::npos)
+      return "is not a number: write it without separators of thousands";
+    return "is not a number";
   }
 
   /// 1,234 is 1.234 or 1234: that others have a decimal point decides for neither.
@@ -951,9 +1019,10 @@ class LogFile {
   char separator_;
   std::optional<std::size_t> stamps_;
   std::size_t count_ = 0, header_line_ = 0, comma_line_ = 0, point_line_ = 0, other_lines_ = 0;
-  bool cut_ = false, labelled_ = false;
+  bool cut_ = false, labelled_ = false, packed_ = false;
   std::vector<std::vector<std::string>> headers_;
   std::vector<std::string> labels_;  // where each line has them
+  std::vector<std::string> words_;   // what stands before each number, where that is its name
   std::vector<Place> places_;
   std::vector<Cells> cells_;
   std::vector<std::vector<double>> columns_;

@@ -331,6 +331,10 @@ healthy topics.csv
 healthy topics.csv --time clock --y position --u effort
 sed 's/^[^,]*,//' plain.csv >no_time.csv
 healthy no_time.csv --sample-time 0.002
+{ cat plain.csv; echo 9.9,1; } >short_last.csv  # cut, with the end of its line
+healthy short_last.csv
+table , | awk -F, '{ printf "t,%s,pos,%s,PWM,%s\n", $1, $2, $3 }' >words.csv
+healthy words.csv --time-unit s --time t --y pos --u PWM
 servo quantum=0.002 >rows.txt
 written t,y,u , t >encoder.csv
 healthy encoder.csv
@@ -361,7 +365,7 @@ sounds b0 plain.csv --b0 0.87
 [[ $said == *"degrees and radians"* ]]
 verdict $? "b0 wrong by 57.3 is not called degrees and radians: $said"
 written t,y,u , '50 * t' >tenths.csv  # 0.1 from row to row: s, or ms at 10 kHz
-sounds time-unit tenths.csv
+refuses "in which unit is the time? Nothing says it of column t, which begins at 0 and rises by 0.1" tenths.csv
 truth=0.02 healthy tenths.csv --time-unit s
 written t_s,y,u , '1e6 * t' >called_seconds.csv
 sounds time-unit called_seconds.csv
@@ -672,6 +676,21 @@ sed '5s/.*/0.03,about 2,1/' plain.csv >word.csv
 refuses "word.csv, line 5: 'about 2' in column 'y' is not a number" word.csv
 sed '7s/.*/0.05,1/' plain.csv >short_line.csv
 refuses "short_line.csv, line 7: only 2 fields, none for 'u'" short_line.csv
+sed '90s/pos,\(.*\),PWM,/PWM,\1,pos,/' words.csv >words_swapped.csv
+refuses "words_swapped.csv, line 90: 'PWM' stands before column 'pos' instead of its name" \
+  words_swapped.csv --time-unit s --time t --y pos --u PWM
+sed "9s/,/,'/2; 9s/\$/'/" plain.csv >quoted_once.csv
+refuses "is not a number: write it without quotation marks" quoted_once.csv
+{ echo 't;y;u'; table ';' | sed '9s/;.*;/;12,345.6;/'; } >thousands.csv
+refuses "'12,345.6' in column 'y' is not a number: write it without separators of thousands" thousands.csv
+sed '90s/^/t,y,u\n/' plain.csv >two_recordings.csv
+refuses "line 90: 'y' in column 'y' is a name, not a number: a second recording begins here" two_recordings.csv
+{ printf 'PK\003\004\n'; head -c 300 /dev/zero; } >book.csv
+refuses "book.csv: it is packed (a workbook, a zip or gz file), no text" book.csv
+{ echo t,y,u; table , | tac; } >newest_first.csv
+refuses "newest_first.csv, line 3: time runs backwards in column t in all rows" newest_first.csv
+written t,y,u , 'sprintf("%.3f", 20240331015940 + t)' >digits.csv
+refuses "If it is a date, write it as 2024-03-01T12:00:00" digits.csv
 sed '9s/^[^,]*/0.02/' plain.csv >backwards.csv
 refuses "backwards.csv, line 9: time runs backwards in column t, from 0.06 to 0.02" backwards.csv
 sed '9s/^[^,]*/0.06/' plain.csv >still.csv

@@ -14,6 +14,7 @@
 #include <esokit/sim/gaussian.hpp>
 #include <esokit/sim/run.hpp>
 #include <limits>
+#include <numbers>
 #include <string>
 #include <utility>
 #include <vector>
@@ -951,7 +952,7 @@ TEST(OtherOrder, RefusesAnOrderGivenTooHigh) {
   options.orders = {3};
   const auto found = esokit::study(log, options).value();
   EXPECT_EQ(found.other_order.order, 2);
-  EXPECT_LT(found.other_order.left, 0.1);
+  EXPECT_LT(found.other_order.left, 1 / std::numbers::e);
   EXPECT_TRUE(said(esokit::judge(found, log, options)).starts_with("order: "));
   options.orders = {2};
   const auto right = esokit::study(log, options).value();
@@ -1076,7 +1077,18 @@ TEST(Judge, RefusesByName) {
   }
   bad.lead = {T, -55};
   bad.input_gain.half_width = 5.1;
+  EXPECT_TRUE(said(esokit::judge(bad, log)).starts_with("interval: "));
+  // Then output error may tell b0, which it does not beside a lead that harms.
+  bad.second_opinion = {{-51, 3}, 0.96, 1.0};
+  bad.lead.left = 0.7;
+  EXPECT_EQ(said(esokit::judge(bad, log)), "accepted");
+  bad.lead.input_gain = -55.2;
   EXPECT_TRUE(said(esokit::judge(bad, log)).starts_with("lead: "));
+  bad = good;
+  bad.returns = 0.1;
+  EXPECT_EQ(said(esokit::judge(bad, log)), "accepted");
+  bad.returns = 0.09;
+  EXPECT_TRUE(said(esokit::judge(bad, log)).starts_with("returns: "));
   bad = good;
   bad.at_once = true;
   EXPECT_TRUE(said(esokit::judge(bad, log)).starts_with("at_once: "));

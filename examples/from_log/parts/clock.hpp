@@ -183,12 +183,13 @@ inline ClockVerdict judge_clock(const ClockRead& read) {
     if (!seconds || read.step > 60) return found;
     if (!three_digits(read.step) && !chosen(read.step) && (of(60) || of(3600) || of(86400)))
       return found;
-    // Milliseconds with decimals are as likely above a tenth where they are a whole number of kHz,
-    // and from one on.
+    // Milliseconds with decimals are as likely above a twentieth where they are a whole number of
+    // kHz, and from one on.
     const double kilohertz = 1.0 / read.step;
     const bool whole_kilohertz =
         read.step > 0.049 && std::abs(kilohertz - std::round(kilohertz)) < 1e-4 * kilohertz;
-    return take(1.0, false, whole_kilohertz || read.step >= 1.0);
+    if (whole_kilohertz || read.step >= 1.0) return found;
+    return take(1.0, false, false);
   }
   // Of a large number one unit may be some minutes, and the others weeks. (A clock of 100 ns is one
   // with a date.)

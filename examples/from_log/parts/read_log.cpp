@@ -2,6 +2,7 @@
 #include <array>
 #include <cctype>
 #include <cmath>
+#include <functional>
 #include <iterator>
 #include <limits>
 #include <map>
@@ -258,7 +259,9 @@ double find_unit(const Settings& settings, const LogFile& file, const ClockRead&
                             : "Nothing says it of " + column + ", which begins at " +
                                   number_text(clock.first, 10) + " and rises by " +
                                   number_text(clock.step, 4) + " from row to row") +
-                   ". Set one of " + units_text(verdict.open, clock.step) +
+                   (verdict.open.empty() ? ". If it is a date, write it as 2024-03-01T12:00:00. "
+                                           "Else set --time-unit"
+                                         : ". Set one of " + units_text(verdict.open, clock.step)) +
                    ", or the time from row to row: --sample-time SECONDS" + increment_of(file));
   }
   const std::string unit = unit_name(verdict.unit);
@@ -436,6 +439,10 @@ void mend_stamps(const Settings& settings, const LogFile& file, Input& input,
   }
   for (std::size_t i = 1; i < stamps.size(); ++i) {
     if (!(stamps[i] < stamps[i - 1])) continue;
+    if (i == 1 && std::is_sorted(stamps.begin(), stamps.end(), std::greater<>{})) {
+      throw LogError(file.where(i) + "time runs backwards" + in +
+                     " in all rows: the newest row is the first. Sort the rows by time");
+    }
     throw LogError(file.where(i) + "time runs backwards" + in + ", from " +
                    number_text(origin + stamps[i - 1], 15) + " to " +
                    number_text(origin + stamps[i], 15) + since +

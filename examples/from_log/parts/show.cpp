@@ -49,6 +49,11 @@ std::string in_words(const std::string& field, const esokit::Identified& found) 
       {"order",
        "Another order explains this log far better. Give it with --order (a position under a motor "
        "has 2, a speed or a temperature 1), or log the y of this one."},
+      {"returns",
+       "What was found is the law by which u follows y, not the machine: the reference hardly "
+       "moves. "
+       "Log again with a reference that steps every few settling times, by as much as the machine "
+       "may move. The controller may stay as it is."},
       {"own_input",
        "u depends on y alone: the loop is closed and its reference does not move. Log again with a "
        "reference that steps every few settling times, by as much as the machine may move. The "
@@ -83,6 +88,14 @@ std::string in_words(const std::string& field, const esokit::Identified& found) 
       {"rows",
        "The log is too short. Record at least 200 rows without a gap; 20 s at the sample rate of "
        "the controller are better."}};
+  if (field == "latency" && found.latency.value * std::abs(found.pole.value) > 0.8) {
+    return "y settles as fast as it begins to react, so lag, dead time and pole cannot be told "
+           "apart. Log more rows per second, and y before its filters.";
+  }
+  if (field == "rise" && found.late_rows > 0) {
+    return "y rises or falls faster than u can move it by this b0: something else moves y. Log "
+           "what moves it (--measured COLUMN).";
+  }
   // What depends on the size of u looks as if it depended on the frequency.
   if (field == "plateau" && found.by_size.differ()) return "b0 depends on the size of u.";
   const auto at = all.find(field);

@@ -97,8 +97,14 @@ class InnovationsFit {
  private:
   /// Rows at the start of a piece that only fill the lag and the dead time: those of the longest
   /// latency, unless much of the motion of u lies there, as in the record of a step. Then u is
-  /// taken to have been at rest before.
+  /// taken to have been at rest before. Else, if it is unknown, what the lag has left of the u
+  /// before is fitted: a heater that is on when the log begins may have been off a moment ago.
   [[nodiscard]] std::size_t lead(std::size_t from, std::size_t to) const;
+  [[nodiscard]] std::size_t longest_lead(std::size_t from, std::size_t to) const;
+
+  /// Takes out of innovations, piece by piece, what an unknown lag at the start may explain.
+  /// @return how much of `started_` that was, in each piece
+  std::vector<double> without_start(std::vector<double>& innovations) const;
 
   static constexpr std::array<double, 4> longest_step = {1.0, 0.7, 0.4, 0.2};
   static constexpr std::array<double, 4> small_step = {1e-4, 1e-4, 1e-4, 1e-4};
@@ -135,8 +141,12 @@ class InnovationsFit {
   std::size_t rows_ = 0;                        // number of innovations used
   std::vector<std::vector<double>> columns_{};  // of y, u, and the data's columns
   std::vector<double> residual_{};
+  std::vector<double>
+      unknown_{};  // an input in the first row of pieces of which u before is unknown
+  std::vector<double> started_{};  // its innovations
+  std::vector<double> before_{};   // its number in each piece
   std::vector<std::vector<double>> kept_columns_{};
-  std::vector<double> kept_residual_{};
+  std::vector<double> kept_residual_{}, kept_started_{}, kept_before_{};
   mutable std::vector<double> force_{}, combined_{};
   mutable detail::GainTables cached_{};
 };

@@ -40,7 +40,10 @@ double half_row(const Identified& found);
 /// better with u so much earlier, too, or to be nearer to the b0 of the lead.
 bool leads(const Identified& found);
 
-/// Whether output error tells b0: it is informative, and y does not move before u. Where y follows
+/// Whether y moves before u, and b0 is more than a tenth off without it.
+bool lead_harms(const Identified& found);
+
+/// Whether output error tells b0: it is informative, and no lead harms. Where y follows
 /// u within half a row, no machine was seen between them: then it has to explain nearly all of y.
 bool informed(const Identified& found);
 

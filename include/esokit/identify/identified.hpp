@@ -147,15 +147,19 @@ struct Identified {
   /// that b0, pole and friction are fitted without u there; 0: it does not hold. Latency, lag and
   /// dead time are of all rows.
   double held = 0;
-  double rise = 0;                 ///< how fast y changes, over what b0 and pole allow (order 1)
-  int late_rows = 0;               ///< rows by which u was taken earlier than it was logged
-  Lead lead{};                     ///< how early y moves before u, if it does
-  OtherOrder other_order{};        ///< the other order that explains the log best there
-  bool at_once = false;            ///< y follows u within the row, with nothing in between
-  int averaged = 1;                ///< rows of the log that were averaged into one
-  bool at_bound = false;           ///< a parameter is at a bound of its range at the plateau
-  double excitation = 0;           ///< smallest relative standard error of b0
-  double own_input = 1;            ///< share of u that does not follow from y and the row before
+  double rise = 0;           ///< how fast y changes, over what b0 and pole allow (order 1)
+  int late_rows = 0;         ///< rows by which u was taken earlier than it was logged
+  Lead lead{};               ///< how early y moves before u, if it does
+  OtherOrder other_order{};  ///< the other order that explains the log best there
+  bool at_once = false;      ///< y follows u within the row, with nothing in between
+  int averaged = 1;          ///< rows of the log that were averaged into one
+  bool at_bound = false;     ///< a parameter is at a bound of its range at the plateau
+  double excitation = 0;     ///< smallest relative standard error of b0
+  double own_input = 1;      ///< share of u that does not follow from y and the row before
+
+  /// How fast u as a function of y alone lets y return, over what it would be without the pole
+  /// (order 1). Of an unstable pole and next to nothing: the law was found, not the machine.
+  double returns = 1;
   LogReport log{};                 ///< the report on the log before any fit
   Plateau plateau{};               ///< b0 over the bandwidth
   std::vector<OrderFit> orders{};  ///< best fit of each order, by order

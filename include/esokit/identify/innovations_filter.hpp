@@ -51,6 +51,10 @@ struct FitData {
   /// else it is unknown anew, as y is.
   bool one_load = false;
 
+  /// Whether u before a piece is unknown: then what the lag has left of it is fitted, a number for
+  /// each piece. Else u was at rest.
+  bool unknown_before = false;
+
   /// More inputs that reach the plant through the same lag and dead time, each as long as u.
   std::vector<std::vector<double>> inputs{};
 

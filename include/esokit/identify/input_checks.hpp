@@ -75,6 +75,9 @@ std::vector<double> ones(std::size_t rows);
 /// reference never moves.
 double own_input(const FitData& data);
 
+/// Slope of the straight line that u follows over y.
+double slope_of_law(const FitData& data);
+
 /// Whether y follows u within the row: u of the last three rows explains y, and y of the row before
 /// adds little. Of less than four changes of u nothing is said.
 bool at_once(const FitData& data);

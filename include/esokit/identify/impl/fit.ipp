@@ -22,12 +22,19 @@ ESOKIT_FUNCTION InnovationsFit::InnovationsFit(const FitData& data, const FitMod
     : data_(data), model_(model), bounds_(bounds) {
   for (std::size_t piece = 0; piece < data.starts.size(); ++piece) {
     const std::size_t to = piece + 1 < data.starts.size() ? data.starts[piece + 1] : data.y.size();
-    lead_.push_back(lead(data.starts[piece], to));
+    const std::size_t from = data.starts[piece];
+    lead_.push_back(lead(from, to));
     std::size_t seen = 0;
-    for (std::size_t k = data.starts[piece] + lead_.back(); k < to; ++k) seen += data.has(k);
+    for (std::size_t k = from + lead_.back(); k < to; ++k) seen += data.has(k);
     // As the filter has it: the load of the first piece goes on.
     const bool known = data.one_load && rows_ > 0 && model.extension == 1;
-    const auto blind = static_cast<std::size_t>(model.order + (known ? 0 : model.extension));
+    const bool unknown = data.unknown_before && lead_.back() == longest_lead(from, to);
+    if (unknown) {
+      unknown_.resize(data.y.size());
+      unknown_[from] = 1.0;
+    }
+    const auto blind =
+        static_cast<std::size_t>(model.order + (known ? 0 : model.extension) + (unknown ? 1 : 0));
     if (seen > blind) rows_ += seen - blind;
   }
 }
@@ -43,6 +50,12 @@ ESOKIT_FUNCTION Fit InnovationsFit::minimise(const FitPoint& start, bool with_ba
                                              int steps) {
   Fit best = at(inside(start));
   double damping = 1e-3;
+  const auto keep = [&] {
+    std::swap(residual_, kept_residual_);
+    std::swap(columns_, kept_columns_);
+    std::swap(started_, kept_started_);
+    std::swap(before_, kept_before_);
+  };
   for (int step = 0; step < steps; ++step) {
     const auto [jacobian, free] = sensitivities(best, with_bandwidth);
     if (free.empty()) return best;
@@ -54,8 +67,7 @@ ESOKIT_FUNCTION Fit InnovationsFit::minimise(const FitPoint& start, bool with_ba
       // None at a bound, or one that is not finite: more damping would not help.
       if (!step_within(best.at, normal, right, free, damping, move)) break;
       const FitPoint trial_point = moved(best.at, move);
-      std::swap(residual_, kept_residual_);
-      std::swap(columns_, kept_columns_);
+      keep();
       const Fit trial = at(trial_point);
       if (trial.mean_square < best.mean_square) {
         const double gain = 1.0 - trial.mean_square / best.mean_square;
@@ -66,8 +78,7 @@ ESOKIT_FUNCTION Fit InnovationsFit::minimise(const FitPoint& start, bool with_ba
         if (gain * static_cast<double>(best.rows) < 0.02) best.converged = true;
         break;
       }
-      std::swap(residual_, kept_residual_);
-      std::swap(columns_, kept_columns_);
+      keep();
       damping *= 8.0;
     }
     if (!better) best.converged = true;
@@ -98,6 +109,7 @@ ESOKIT_FUNCTION InnovationsFit::Sensitivities InnovationsFit::sensitivities(cons
     with_filter(beside,
                 [&](const auto& filter) { run_whole(filter, fit.linear, residual.data()); });
     for (std::size_t k = 0; k < residual.size(); ++k) residual[k] = (residual[k] - base[k]) / step;
+    without_start(residual);
     result.columns.push_back(std::move(residual));
     result.free.push_back(i);
   }
@@ -140,7 +152,25 @@ ESOKIT_FUNCTION std::vector<double> InnovationsFit::column_innovations(
         [&](std::size_t, std::ptrdiff_t k) { return column[static_cast<std::size_t>(k)]; },
         {out.data()});
   });
+  without_start(out);
   return out;
+}
+
+ESOKIT_FUNCTION std::vector<double> InnovationsFit::without_start(
+    std::vector<double>& innovations) const {
+  std::vector<double> parts(data_.starts.size(), 0.0);
+  if (unknown_.empty()) return parts;
+  for (std::size_t piece = 0; piece < parts.size(); ++piece) {
+    const std::size_t from = data_.starts[piece];
+    const std::size_t to = piece + 1 < parts.size() ? data_.starts[piece + 1] : data_.y.size();
+    const double* const start = started_.data() + from;
+    double* const of = innovations.data() + from;
+    const double square = detail::dot(start, start, to - from);
+    if (unknown_[from] == 0.0 || !(square > 0.0)) continue;
+    parts[piece] = detail::dot(start, of, to - from) / square;
+    for (std::size_t k = 0; k < to - from; ++k) of[k] -= parts[piece] * start[k];
+  }
+  return parts;
 }
 
 ESOKIT_FUNCTION bool InnovationsFit::at_bound(const FitPoint& p) const {
@@ -215,11 +245,14 @@ ESOKIT_FUNCTION void InnovationsFit::normal_equations(std::span<const std::vecto
   }
 }
 
-ESOKIT_FUNCTION std::size_t InnovationsFit::lead(std::size_t from, std::size_t to) const {
+ESOKIT_FUNCTION std::size_t InnovationsFit::longest_lead(std::size_t from, std::size_t to) const {
   // Of a short piece more than a third would say too little.
-  const auto most =
-      (std::min)(static_cast<std::size_t>(std::ceil(bounds_.latency_max / data_.sample_time)),
-                 (to - from) / 3);
+  return (std::min)(static_cast<std::size_t>(std::ceil(bounds_.latency_max / data_.sample_time)),
+                    (to - from) / 3);
+}
+
+ESOKIT_FUNCTION std::size_t InnovationsFit::lead(std::size_t from, std::size_t to) const {
+  const std::size_t most = longest_lead(from, to);
   const std::vector<double>& u = data_.u;
   double first = 0.0, all = 0.0;
   std::size_t rest = 0;
@@ -304,6 +337,8 @@ void InnovationsFit::run_whole(const Filter& filter, const std::vector<double>& 
                                double* out) const {
   force_.assign(data_.y.size(), 0.0);
   for (std::size_t k = 0; k < force_.size(); ++k) force_[k] = linear[0] * data_.u[k];
+  for (std::size_t piece = 0; piece < before_.size(); ++piece)
+    force_[data_.starts[piece]] += before_[piece];
   combine(force_, data_.inputs, linear, 1);
   combined_.assign(data_.y.size(), 0.0);
   combine(combined_, data_.columns, linear, 1 + data_.inputs.size());
@@ -346,6 +381,13 @@ void InnovationsFit::solve_linear(const Filter& filter, Fit& fit) {
   while (next + 4 <= count) run_columns(std::integral_constant<int, 4>{});
   while (next + 2 <= count) run_columns(std::integral_constant<int, 2>{});
   if (next < count) run_columns(std::integral_constant<int, 1>{});
+  std::vector<std::vector<double>> parts;
+  if (!unknown_.empty()) {
+    started_.resize(rows);
+    filter.template run<1>(data_, lead_, unknown_, none, [](std::size_t) { return 1.0; }, nothing,
+                           {started_.data()});
+    for (auto& column : columns_) parts.push_back(without_start(column));
+  }
   const auto solve = [&] {
     std::vector<double> normal;
     normal_equations(std::span(columns_).subspan(1), columns_[0], normal, fit.linear);
@@ -363,6 +405,12 @@ void InnovationsFit::solve_linear(const Filter& filter, Fit& fit) {
   residual_ = columns_[0];
   for (std::size_t c = 1; c < count; ++c) {
     for (std::size_t k = 0; k < rows; ++k) residual_[k] += fit.linear[c - 1] * columns_[c][k];
+  }
+  before_.assign(parts.empty() ? 0 : data_.starts.size(), 0.0);
+  for (std::size_t c = 0; c < parts.size(); ++c) {
+    const double factor = c == 0 ? 1.0 : fit.linear[c - 1];
+    for (std::size_t piece = 0; piece < before_.size(); ++piece)
+      before_[piece] -= factor * parts[c][piece];
   }
   const double sum = detail::dot(residual_.data(), residual_.data(), rows);
   fit.rows = std::max<std::size_t>(rows_, 1);

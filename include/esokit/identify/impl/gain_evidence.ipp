@@ -123,9 +123,14 @@ ESOKIT_FUNCTION bool leads(const Identified& found) {
                                       (std::abs)(second.input_gain.value - found.input_gain.value);
 }
 
+ESOKIT_FUNCTION bool lead_harms(const Identified& found) {
+  const double off = (std::abs)(found.lead.input_gain - found.input_gain.value);
+  return leads(found) && !(off <= 0.1 * (std::abs)(found.input_gain.value));
+}
+
 ESOKIT_FUNCTION bool informed(const Identified& found) {
   const SecondOpinion& second = found.second_opinion;
-  if (!second.informative() || leads(found)) return false;
+  if (!second.informative() || lead_harms(found)) return false;
   return found.latency.value >= half_row(found) ||
          (second.explained >= 0.95 &&
           (std::abs)(second.input_gain.value - found.input_gain.value) <=

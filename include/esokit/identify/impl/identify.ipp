@@ -390,8 +390,14 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
                         2.0 * result.friction.value +
                         6.0 * (result.noise.value + result.log.quantisation) / window;
     result.rise = span_of_rates(used, window) / most;
+    // y' = -a y + b0 u with u = s y: a loop that is any good returns faster than y runs away.
+    const double feedback = -result.input_gain.value * slope_of_law(used);
+    if (result.pole.value < 0.0 && feedback > 0.0)
+      result.returns = (result.pole.value + feedback) / feedback;
   }
-  // The margins of a design have to hold for it, too.
+  // The margins of a design have to hold for it, too: for an earlier u, and for what is not seen.
+  if (leads(result))
+    result.latency.half_width = (std::max)(result.latency.half_width, result.lead.time);
   if (const double unseen = half_row(result) - result.latency.value;
       unseen > 0.0 && !white(result, options) && informed(result)) {
     result.latency.half_width = (std::max)(result.latency.half_width, unseen);
@@ -616,6 +622,10 @@ ESOKIT_FUNCTION Check<double> judge(const Identified& found, const Log& log,
   rules.demand(found.own_input > detail::own_input_min, "own_input", found.own_input,
                "is the share of u that does not follow from y, which is too small: record a "
                "moving reference");
+  rules.demand(
+      found.returns >= 0.1, "returns", found.returns,
+      "is how fast y returns by what u follows of y, which is next to nothing: the law of u "
+      "was found and no machine; record a moving reference");
   rules.demand(!found.at_once, "at_once", found.latency.value,
                "is the latency found, but y follows u at once: is y an acceleration or a force? "
                "Record its speed or position, or more rows per second");
@@ -634,9 +644,8 @@ ESOKIT_FUNCTION Check<double> judge(const Identified& found, const Log& log,
   const double widest = informed ? options.interval_agreed : options.interval_max;
   // A lead does no harm if b0 is nearly the same without it. Feedback from y makes small ones up.
   const double off = (std::abs)(found.lead.input_gain - found.input_gain.value);
-  const double harmless =
-      (std::max)(found.input_gain.half_width, 0.1 * (std::abs)(found.input_gain.value));
-  rules.demand(!detail::leads(found) || (off <= harmless && found.input_gain.share() <= widest),
+  rules.demand(!detail::lead_harms(found) ||
+                   (off <= found.input_gain.half_width && found.input_gain.share() <= widest),
                "lead", found.lead.time, "is the time by which y moves before u: is u logged late?");
   rules.demand(detail::white(found, options) || informed,
                {"correlation", found.correlation,

@@ -172,6 +172,10 @@ ESOKIT_FUNCTION double own_input(const FitData& data) {
       linear_law({ones(y.size()), y, change, delayed(data.u, 1)}, delayed(data.u, 0)).left);
 }
 
+ESOKIT_FUNCTION double slope_of_law(const FitData& data) {
+  return linear_law({delayed(data.y, 0)}, delayed(data.u, 0)).factors[0];
+}
+
 ESOKIT_FUNCTION bool at_once(const FitData& data) {
   int changes = 0;
   for (std::size_t k = 1; k < data.u.size(); ++k) changes += data.u[k] != data.u[k - 1] ? 1 : 0;

@@ -305,7 +305,7 @@ ESOKIT_FUNCTION Expected<PreparedLog, Error<double>> prepare(const Log& log) {
   }
   if (as_logged) data.measured = data.offsets = {};
   report.pieces = data.starts.size();
-  data.one_load = true;
+  data.one_load = data.unknown_before = true;
   if (data.y.size() < 200)
     return E{"rows",
              size(data.y.size()),
@@ -323,6 +323,7 @@ ESOKIT_FUNCTION FitData excerpt(const FitData& data, std::size_t most) {
   FitData out;
   out.sample_time = data.sample_time;
   out.averaged = data.averaged;
+  out.unknown_before = data.unknown_before;
   out.starts.clear();
   out.columns.resize(data.columns.size());
   std::size_t piece = 0;
@@ -364,6 +365,7 @@ ESOKIT_FUNCTION FitData averaged(const FitData& data, int fold) {
   out.sample_time = data.sample_time * fold;
   out.averaged = data.averaged * fold;
   out.one_load = data.one_load;
+  out.unknown_before = data.unknown_before;
   out.starts.clear();
   out.columns.resize(data.columns.size());
   const auto by = static_cast<std::size_t>(fold);
