@@ -141,8 +141,8 @@ class InnovationsFit {
   std::size_t rows_ = 0;                        // number of innovations used
   std::vector<std::vector<double>> columns_{};  // of y, u, and the data's columns
   std::vector<double> residual_{};
-  std::vector<double>
-      unknown_{};  // an input in the first row of pieces of which u before is unknown
+  // The range of u in the first row of each piece of which u before is unknown: an input.
+  std::vector<double> unknown_{};
   std::vector<double> started_{};  // its innovations
   std::vector<double> before_{};   // its number in each piece
   std::vector<std::vector<double>> kept_columns_{};

@@ -20,6 +20,7 @@ namespace esokit {
 ESOKIT_FUNCTION InnovationsFit::InnovationsFit(const FitData& data, const FitModel& model,
                                                const FitBounds& bounds)
     : data_(data), model_(model), bounds_(bounds) {
+  const auto [least, largest] = std::minmax_element(data.u.begin(), data.u.end());
   for (std::size_t piece = 0; piece < data.starts.size(); ++piece) {
     const std::size_t to = piece + 1 < data.starts.size() ? data.starts[piece + 1] : data.y.size();
     const std::size_t from = data.starts[piece];
@@ -31,7 +32,7 @@ ESOKIT_FUNCTION InnovationsFit::InnovationsFit(const FitData& data, const FitMod
     const bool unknown = data.unknown_before && lead_.back() == longest_lead(from, to);
     if (unknown) {
       unknown_.resize(data.y.size());
-      unknown_[from] = 1.0;
+      unknown_[from] = *largest - *least;
     }
     const auto blind =
         static_cast<std::size_t>(model.order + (known ? 0 : model.extension) + (unknown ? 1 : 0));
@@ -338,7 +339,7 @@ void InnovationsFit::run_whole(const Filter& filter, const std::vector<double>& 
   force_.assign(data_.y.size(), 0.0);
   for (std::size_t k = 0; k < force_.size(); ++k) force_[k] = linear[0] * data_.u[k];
   for (std::size_t piece = 0; piece < before_.size(); ++piece)
-    force_[data_.starts[piece]] += before_[piece];
+    force_[data_.starts[piece]] += before_[piece] * unknown_[data_.starts[piece]];
   combine(force_, data_.inputs, linear, 1);
   combined_.assign(data_.y.size(), 0.0);
   combine(combined_, data_.columns, linear, 1 + data_.inputs.size());
@@ -386,6 +387,15 @@ void InnovationsFit::solve_linear(const Filter& filter, Fit& fit) {
     started_.resize(rows);
     filter.template run<1>(data_, lead_, unknown_, none, [](std::size_t) { return 1.0; }, nothing,
                            {started_.data()});
+    // Of a lag that is forgotten by then rounding errors are left, which must not explain anything.
+    const double moved_by_u = detail::dot(columns_[1].data(), columns_[1].data(), rows);
+    for (std::size_t piece = 0; piece < data_.starts.size(); ++piece) {
+      const std::size_t from = data_.starts[piece];
+      const std::size_t to = piece + 1 < data_.starts.size() ? data_.starts[piece + 1] : rows;
+      double* const start = started_.data() + from;
+      if (detail::dot(start, start, to - from) < 1e-6 * moved_by_u)
+        std::fill(start, start + (to - from), 0.0);
+    }
     for (auto& column : columns_) parts.push_back(without_start(column));
   }
   const auto solve = [&] {
