@@ -333,7 +333,7 @@ sed 's/^[^,]*,//' plain.csv >no_time.csv
 healthy no_time.csv --sample-time 0.002
 { cat plain.csv; echo 9.9,1; } >short_last.csv  # cut, with the end of its line
 healthy short_last.csv
-table , | awk -F, '{ printf "t,%s,pos,%s,PWM,%s\n", $1, $2, $3 }' >words.csv
+tail -n +2 plain.csv | awk -F, '{ printf "t,%s,pos,%s,PWM,%s\n", $1, $2, $3 }' >words.csv
 healthy words.csv --time-unit s --time t --y pos --u PWM
 servo quantum=0.002 >rows.txt
 written t,y,u , t >encoder.csv
@@ -677,14 +677,14 @@ refuses "word.csv, line 5: 'about 2' in column 'y' is not a number" word.csv
 sed '7s/.*/0.05,1/' plain.csv >short_line.csv
 refuses "short_line.csv, line 7: only 2 fields, none for 'u'" short_line.csv
 sed '90s/pos,\(.*\),PWM,/PWM,\1,pos,/' words.csv >words_swapped.csv
-refuses "words_swapped.csv, line 90: 'PWM' stands before column 'pos' instead of its name" \
+refuses "words_swapped.csv, line 90: 'pos' stands before column 'PWM' instead of its name" \
   words_swapped.csv --time-unit s --time t --y pos --u PWM
 sed "9s/,/,'/2; 9s/\$/'/" plain.csv >quoted_once.csv
 refuses "is not a number: write it without quotation marks" quoted_once.csv
 { echo 't;y;u'; table ';' | sed '9s/;.*;/;12,345.6;/'; } >thousands.csv
 refuses "'12,345.6' in column 'y' is not a number: write it without separators of thousands" thousands.csv
 sed '90s/^/t,y,u\n/' plain.csv >two_recordings.csv
-refuses "line 90: 'y' in column 'y' is a name, not a number: a second recording begins here" two_recordings.csv
+refuses "line 90: 'u' in column 'u' is a name, not a number: a second recording begins here" two_recordings.csv
 { printf 'PK\003\004\n'; head -c 300 /dev/zero; } >book.csv
 refuses "book.csv: it is packed (a workbook, a zip or gz file), no text" book.csv
 { echo t,y,u; table , | tac; } >newest_first.csv
