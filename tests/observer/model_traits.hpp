@@ -92,8 +92,8 @@ struct ModelTraitsOf {
     }
     if (law == Law::order_of_accuracy) return "an observer with a model has no continuous form";
     if (law == Law::gap_gain_is_that_of_longer_sample) {
-      return "a gap is bridged by a Kalman filter's gain, which stays bounded where that of the "
-             "longer sample does not; see gain/model_gain.hpp";
+      return "a gap is bridged by a gain that stays bounded where that of the longer sample does "
+             "not; see gain/model_gain.hpp";
     }
     if (law == Law::recurring_gaps_are_stable) {
       return "it asks for the decay of the longer sample; see "

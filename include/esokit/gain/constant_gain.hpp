@@ -107,7 +107,7 @@ class ConstantGain {
       proven_{};
 };
 
-template <int Size, Scalar S, class Placement = EqualPoles, int MostBridged = 101>
+template <int Size, Scalar S, class Placement = EqualPoles, int MostBridged = 401>
 class ModelGain;  // gain/model_gain.hpp, to be included with a model other than the chain
 
 template <int Size, Scalar S, class Placement = EqualPoles, int Count = 9, int MostBridged = 16>

@@ -12,6 +12,8 @@
 #include <esokit/gain/placement.hpp>
 #include <esokit/gain/riccati.hpp>
 #include <esokit/model/sampled_model.hpp>
+#include <optional>
+#include <utility>
 
 namespace esokit {
 
@@ -126,80 +128,124 @@ struct PartDesign {
     step = in_units(step, units);
     due.fill(never);
     const Square sample = corrected(step, output, gain);
-    // Which V suits best depends on how far the poles are apart. A step in which it rises is added
-    // to the sum of which P consists; that lets V fall there, and rise elsewhere. What the gain
-    // does not move, as a lag that is only computed, has an error all the same.
+    std::optional<Proven> proven;
+    // Which V suits best depends on how far the poles are apart, and on how far a sine turns while
+    // samples are missing: with P in the place of k k' its sum is spread over more directions. What
+    // the gain does not move, as a lag that is only computed, has an error all the same. A step in
+    // which V rises is added to the sum of which P consists; that lets V fall there, and rise
+    // elsewhere.
     constexpr int rounds = 8;
+    const Square moved = column(gain) * column(gain).transpose() + Square::Identity() * least;
     for (const S share : {S(1), S(0.2)}) {
-      Square spread = column(gain) * column(gain).transpose() + Square::Identity() * least;
-      for (int round = 0; round < rounds && longest_step < Longest; ++round) {
-        const S rate = share * decay;
-        const auto square = FallingSquare<Size, S>::make(sample, spread, rate);
-        if (!square) break;
-        const Square rising = find_gap_gains(*square, step, output, units, rate);
-        spread = spread + (rising * square->covariance() * rising.transpose()) * rate;
+      const S rate = share * decay;
+      const auto first = FallingSquare<Size, S>::make(sample, moved, rate);
+      if (!first) continue;
+      for (Square spread : {moved, Square(first->covariance() * rate)}) {
+        for (int round = 0; round < rounds && longest_step < Longest; ++round) {
+          const auto square = FallingSquare<Size, S>::make(sample, spread, rate);
+          if (!square) break;
+          S noise(1.0);
+          const int before = longest_step;
+          const Square rising = find_gap_gains(*square, step, sample, output, units, noise);
+          if (longest_step > before || !proven) proven = Proven{*square, rate, noise};
+          spread = spread + (rising * square->covariance() * rising.transpose()) * (S(4) * rate);
+        }
       }
     }
+    if (proven) find_recovery(*proven, step, output, units);
   }
 
   /// The same with a given V. Nothing changes if it bridges no more than what was found before.
+  /// @param noise R, see gap_gain
   /// @return (I - k C) Phi of the first step in which V rises
   Square find_gap_gains(const FallingSquare<Size, S>& square, const Square& step,
-                        const Array<S, Size>& output, const Array<S, Size>& units, const S& rate) {
+                        const Square& sample, const Array<S, Size>& output,
+                        const Array<S, Size>& units, S& noise) {
     auto found = gains;
-    bool best = false;   // of those that were looked at
-    Square over = step;  // Phi^M - I of the last step that was looked at
-    Square error;
-    S noise(1.0);
+    // Phi^M - I and A^M - I of the last step that was looked at, A that of an ordinary correction.
+    Square over = step, ordinary = sample, longer, error;
     for (int i = 1; i < count; ++i) {
       const int first = first_step(i),
                 next = first_step(i + 1) < Longest + 1 ? first_step(i + 1) : Longest + 1;
-      Square middle = over;
-      for (int samples = first; samples <= (first + next - 1) / 2; ++samples)
+      Square middle = over, wanted = ordinary;
+      for (int samples = first; samples < next; ++samples) {
+        ordinary = joined(ordinary, sample);
+        if (samples > (first + next - 1) / 2) continue;
         middle = joined(middle, step);
-      const Square phi = middle + Square::Identity();
-      const Square grown = phi * square.covariance() * phi.transpose();
-      auto& gain = found[static_cast<std::size_t>(i)];
-      // R is halved until V falls in all steps with this gain; at R = 0 it may rise, too.
-      int samples = first;
-      for (int halvings = 0; samples < next; ++halvings, noise = noise * S(0.5)) {
-        if (halvings == 16) break;
-        S innovation = noise;
-        gain = elements(grown * column(output));
-        for (std::size_t row = 0; row < Size; ++row)
-          innovation = innovation + output[row] * gain[row];
-        for (S& k : gain) k = k / innovation;
-        Square longer = over;
-        for (samples = first; samples < next; ++samples) {
+        wanted = ordinary;
+      }
+      // The last step, at least first - 1, up to which V falls with a gain.
+      const auto reached = [&](const Vector<S, Size>& gain) {
+        longer = over;
+        for (int samples = first; samples < next; ++samples) {
           longer = joined(longer, step);
-          error = corrected(longer, output, gain);
-          if (!square.falls(error)) break;
+          error = corrected(longer, output, elements(gain));
+          if (!square.falls(error)) return samples - 1;
         }
-        if (samples == next) {
-          over = longer;
-          break;
-        }
+        return next - 1;
+      };
+      const auto [gain, last] = gap_gain(square, middle, wanted, output, noise, next - 1, reached);
+      for (std::size_t row = 0; row < Size; ++row) {
+        found[static_cast<std::size_t>(i)][row] = gain(static_cast<int>(row)) * units[row];
       }
-      for (std::size_t row = 0; row < Size; ++row) gain[row] = gain[row] * units[row];
-      if (samples - 1 > longest_step) {
-        longest_step = samples - 1;
+      if (last > longest_step) {
+        longest_step = last;
         gains = found;
-        best = true;
       }
-      if (samples < next) break;
+      if (last < next - 1) break;
+      over = longer;
     }
-    if (best || longest_step == 1) find_recovery(square, step, output, units, rate, noise);
     return error + Square::Identity();
   }
 
-  /// Gains of longer steps than longest_step, and what is due after them. @param noise R
-  void find_recovery(const FallingSquare<Size, S>& square, const Square& step,
-                     const Array<S, Size>& output, const Array<S, Size>& units, const S& rate,
-                     const S& noise) {
+  /// A gain for a step, and up to which one V falls with it: that whose error is nearest to the one
+  /// that as many ordinary corrections leave, in the mean over all errors of covariance P; where V
+  /// would rise with it, one between it and that of a Kalman filter.
+  /// @param middle Phi^M - I @param ordinary A^M - I @param noise R, halved as far as V asks for
+  /// @param most what `reached` returns if V falls in all steps that share the gain
+  template <class Reached>
+  static std::pair<Vector<S, Size>, int> gap_gain(const FallingSquare<Size, S>& square,
+                                                  const Square& middle, const Square& ordinary,
+                                                  const Array<S, Size>& output, S& noise, int most,
+                                                  const Reached& reached) {
+    const Square phi = middle + Square::Identity();
+    const auto seen = square.covariance() * phi.transpose() * column(output);
+    const auto grown = phi * seen;
+    S variance(0.0);
+    for (std::size_t row = 0; row < Size; ++row) {
+      variance = variance + output[row] * grown(static_cast<int>(row));
+    }
+    const auto nearest = (middle - ordinary) * seen / variance;
+    auto gain = nearest;
+    int last = reached(gain);
+    if (last == most) return {gain, last};
+    // R is halved until V falls in all steps with this gain; at R = 0 it may rise, too.
+    for (int halvings = 0; halvings < 16; ++halvings, noise = noise * S(0.5)) {
+      gain = grown / (variance + noise);
+      last = reached(gain);
+      if (last == most) break;
+    }
+    if (last < most) return {gain, last};
+    // The gains with which V falls are convex.
+    for (const S share : {S(0.75), S(0.5), S(0.25)}) {
+      const auto between = gain + (nearest - gain) * share;
+      if (reached(between) == most) return {between, most};
+    }
+    return {gain, reached(gain)};
+  }
+
+  /// The V that bridges most, by what it falls in each sample, and the R of its longest step.
+  struct Proven {
+    FallingSquare<Size, S> square;
+    S rate, noise;
+  };
+
+  /// Gains of longer steps than longest_step, and what is due after them.
+  void find_recovery(const Proven& proven, const Square& step, const Array<S, Size>& output,
+                     const Array<S, Size>& units) {
+    const auto& [square, rate, noise] = proven;
     using std::expm1;
     using std::log;
-    due.fill(never);
-    counted = 1;
     Square over = step;
     for (int samples = 2; samples <= Longest; ++samples) {
       over = joined(over, step);
@@ -241,18 +287,24 @@ struct PartDesign {
 ///
 /// The chain bridges a gap by the gain that places the poles for a step of M T. With a resonator
 /// this fails: sampled at every M-th sample it can look like a constant, and the gain grows without
-/// bound (50 Hz at 1 ms: 1e5 after 10 missing samples). Instead this law weights y after a gap like
-/// a Kalman filter whose covariance before the gap was P, and has grown during the gap:
+/// bound (50 Hz at 1 ms: 1e5 after 10 missing samples). Instead this law takes the gain whose error
+/// is nearest to the one A^M e that M ordinary corrections leave, A = (I - k C) Phi,
 ///
-///     k_M = P_M C' / (C P_M C' + R),  P_M = Phi^M P Phi^M'
+///     k_M = (Phi^M - A^M) P Phi^M' C' / (C P_M C'),  P_M = Phi^M P Phi^M'
 ///
-/// This is bounded and, as P_M grows, tends to the gain for exact measurements. P is that of
-/// V(e) = e' P^-1 e, which falls in each sample without a gap (gain/gap_certificate.hpp); R is the
-/// largest 2^-i for which V falls in the step over M samples, too. Gaps are bridged up to the
-/// longest for which there is such an R, so errors decay in any sequence of them. After longer gaps
-/// the last R serves, and corrections are due before the next one, see `recovery`. Steps of 5
-/// samples and more share a gain with those up to a fourth longer (that of M in the middle), and V
-/// is tested in each of them: 16 gains last for 101 samples.
+/// so that an observer with lost samples answers as it was designed. P is that of V(e) = e' P^-1 e,
+/// which falls in each sample without a gap (gain/gap_certificate.hpp). Where V would rise in the
+/// step over M samples, the gain is nearer to that of a Kalman filter whose covariance before the
+/// gap was P, or equal to it:
+///
+///     k_M = P_M C' / (C P_M C' + R)
+///
+/// with the largest R = 2^-i for which V falls. Both are bounded and tend to the gain for exact
+/// measurements. Gaps are bridged up to the longest for which there is such an R, so errors decay
+/// in any sequence of them. After longer gaps the last R serves, and corrections are due before the
+/// next one, see `recovery`. Steps of 5 samples and more share a gain with those up to a fourth
+/// longer (that of M in the middle), and V is tested in each of them: 22 gains last for 401
+/// samples.
 /// @tparam MostBridged longest step to be considered, samples
 template <int Size, Scalar S, class Placement, int MostBridged>
 class ModelGain {

@@ -163,7 +163,7 @@ class ObservedLevels {
   /// Missing samples that a correction bridges if no other is due, see `recovering`; after more it
   /// restarts. The config's number for a constant gain (LinearEso, HalfGainEso, ReducedOrderEso,
   /// ModelEso, cascades): for the chain with any list of poles, or up to 7 states by a bandwidth;
-  /// for a model at most 100. Of other gains, in Guarded, and while a model follows a
+  /// for a model at most 400. Of other gains, in Guarded, and while a model follows a
   /// speed, it is `max_gap()`.
   [[nodiscard]] constexpr int longest_gap() const noexcept { return longest_gap_; }
 

@@ -117,6 +117,7 @@ Check<double> with_controller(const TuneModel& model, const TunedDesign& design,
     using Config = decltype(config);
     config.observer.input_gain = static_cast<S>(model.input_gain.value);
     config.observer.sample_time = static_cast<S>(model.sample_time);
+    config.observer.max_gap = model.predicted_samples();
     config.gains.emplace();
     std::transform(
         design.settings.gains.begin(),

@@ -2,6 +2,7 @@
 /// The input of `tune`: the model, one requirement, and the margins that the loop has to keep.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <esokit/analysis/loop.hpp>
@@ -63,6 +64,12 @@ struct TuneModel {
   /// The largest time by which u may be late, with the sample for which it is held, s.
   [[nodiscard]] double latency() const {
     return lag + dead_time + sensor + sample_time + latency_half_width;
+  }
+
+  /// Missing samples over which its controllers predict, the observer's `max_gap`: five latencies,
+  /// 100 to 400.
+  [[nodiscard]] int predicted_samples() const {
+    return static_cast<int>(std::clamp(5.0 * latency() / sample_time, 100.0, 400.0));
   }
 
   /// Order 3: whether a design has to stand friction.

@@ -64,6 +64,8 @@ ESOKIT_FUNCTION ControllerSource controller_source(const TunedDesign& d, const T
     return ".poles = {{" + text + "}}";
   };
   std::string type, config;
+  const int predicted = model.predicted_samples();
+  const std::string gap = predicted > 100 ? ", .max_gap = " + std::to_string(predicted) : "";
   if (d.knows.any()) {
     type = "esokit::ModelEso<esokit::ModelParts{.order = " + n;
     std::string parts;
@@ -89,7 +91,7 @@ ESOKIT_FUNCTION ControllerSource controller_source(const TunedDesign& d, const T
     config = free ? poles("{-1.0 / " + source(model.lag) + ", 0.0}")
                   : ".observer_bandwidth = " + source(d.settings.observer_bandwidth);
     config += ", .input_gain = " + source(model.input_gain.value) +
-              ", .sample_time = " + source(model.sample_time) + ", .model = {" + parts + "}";
+              ", .sample_time = " + source(model.sample_time) + ", .model = {" + parts + "}" + gap;
   } else {
     const std::string common = ".input_gain = " + source(model.input_gain.value) +
                                ", .sample_time = " + source(model.sample_time);
@@ -98,16 +100,16 @@ ESOKIT_FUNCTION ControllerSource controller_source(const TunedDesign& d, const T
     switch (d.family) {
       case TuneFamily::linear:
         type = "esokit::LinearEso<" + n + (d.extension > 1 ? ", double, 2>" : ">");
-        config = bandwidth + common;
+        config = bandwidth + common + gap;
         break;
       case TuneFamily::half_gain:
         type = "esokit::HalfGainEso<" + n + ">";
-        config = bandwidth + common;
+        config = bandwidth + common + gap;
         break;
       case TuneFamily::cascade:
         type = "esokit::CascadeEso<" + n + ", " + std::to_string(d.levels) + ">";
         config = bandwidth + ".bandwidth_factor = " + source(d.settings.bandwidth_factor) + ", " +
-                 common;
+                 common + gap;
         break;
       case TuneFamily::filter: {
         type = "esokit::ExtendedStateFilter<" + n + ">";
@@ -121,7 +123,7 @@ ESOKIT_FUNCTION ControllerSource controller_source(const TunedDesign& d, const T
       }
       case TuneFamily::free_poles:
         type = "esokit::LinearEso<" + n + ", double, 1, esokit::PoleSet>";
-        config = poles("") + ", " + common;
+        config = poles("") + ", " + common + gap;
         break;
     }
   }
