@@ -193,7 +193,10 @@ template <class Observer>
 void plays(double too_early = 0.5) {
   SCOPED_TRACE(testing::internal::GetTypeName<Observer>());
   EXPECT_EQ(growing<Observer>(1), 0);
-  EXPECT_GT(growing<Observer>(too_early), 0);
+  // With sanitizers too few settings are played.
+  if (esokit_test::stride == 1) {
+    EXPECT_GT(growing<Observer>(too_early), 0);
+  }
 }
 
 TEST(LongGaps, NoSequenceGrowsIfWhatIsDueHasCome) {
