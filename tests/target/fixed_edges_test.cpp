@@ -233,6 +233,23 @@ TEST(FixedEdges, OfALoop) {
   }
 }
 
+/// A reported u beyond its range is refused, and the end of the range on its side is what acts.
+TEST(FixedEdges, OfAReportedInput) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  const auto object = Servo::make(loop_config()).value();
+  Loop o(object, encoder()), same(object, encoder());
+  ASSERT_TRUE(o.c.loaded() && same.c.loaded());
+  for (const std::int32_t sign : {1, -1}) {
+    EXPECT_EQ(o.start(0, 0), 0u);
+    EXPECT_EQ(same.start(0, 0), 0u);
+    EXPECT_EQ(o.c.applied(o.at(), sign * (u_most + 1)), u_refused);
+    EXPECT_EQ(same.c.applied(same.at(), sign * u_most), 0u);
+    for (int k = 0; k < 3; ++k) EXPECT_EQ(o.control(0, 5), same.control(0, 5)) << sign;
+    for (unsigned row = 0; row < 3; ++row) EXPECT_EQ(o.estimate(row), same.estimate(row)) << row;
+    EXPECT_EQ(sign * o.estimate(2) < 0, true) << "dhat stands against this u";
+  }
+}
+
 /// The start hold lasts so many samples.
 TEST(FixedEdges, OfAStartHold) {
   if (!there("gcc")) GTEST_SKIP() << "no gcc";
