@@ -59,10 +59,11 @@ struct Found {
 };
 
 /// @param plant_gain over b0 @param stands share of the time for which the sensor stands still
-/// @param loses whether some samples in a row are missing @return how often which fault was named
+/// @param loses whether some samples in a row are missing @param load amplitude of a sine in y^(n)
+/// @return how often which fault was named
 template <class C>
 std::array<int, 9> watches(double plant_gain, double bad, std::uint64_t seed, double stands = 0,
-                           bool loses = false) {
+                           bool loses = false, double load = 1) {
   SCOPED_TRACE(testing::internal::GetTypeName<C>());
   using V = typename C::scalar_type;
   std::array<int, 9> named{};
@@ -101,7 +102,7 @@ std::array<int, 9> watches(double plant_gain, double bad, std::uint64_t seed, do
   V r(1);
   int lost = 0;
   for (int k = 0; k < 20000; ++k) {
-    plant.set_disturbance(std::sin(0.01 * k));
+    plant.set_disturbance(load * std::sin(0.01 * k));
     plant.step(static_cast<double>(mine.output()));
     if (k % 3000 == 0) plant.set_state(std::vector<double>(C::order, 0.0));
     if (random.index(60) == 0) r = static_cast<V>(random.uniform(-1, 1));
@@ -167,6 +168,8 @@ TEST(HealthCode, EqualsTheMonitor) {
   (void)watches<Adrc<OutlierGate<LinearEso<2, double>>>>(1, 0.05, 10, 0, true);
   often(watches<C>(1, 0, 6, 0.8), LoopFault::sensor_still);
   often(watches<Small>(-1, 0.01, 8, 0.3), LoopFault::wrong_sign);
+  // Half of b0, with the wrong sign and loads that help back: where sign_ratio becomes clear.
+  for (const double load : {12, 15}) (void)watches<Small>(-0.5, 0, 12, 0, false, load);
 }
 
 /// What is found at, beside and between all limits.
