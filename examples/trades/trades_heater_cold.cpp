@@ -279,7 +279,7 @@ int main(int argc, char** argv) {
   std::array<Way, 3> ways{
       Way{"PI", [&](const Numbers& numbers) { return pi(model, numbers); }},
       Way{"Smith predictor", [&](const Numbers& numbers) { return smith(model, numbers); }},
-      Way{"ADRC, not given",
+      Way{"ADRC, fan not known",
           [&](const Numbers& numbers) { return adrc(heater.settings(), model, numbers); }}};
   choose(ways[0], model, {0.7, 5});
   choose(ways[1], model, {0.8, 4});
@@ -398,7 +398,7 @@ int main(int argc, char** argv) {
       "Left, from cold: full power, a relay that finds gain, lag and dead time, ADRC from the "
       "dashed line on, and five times a fan of 100 % for 400 s: not given, given, given 30 % too "
       "little, lost, given at 40 degrees. Right: a fan from 50 to 450 s under a PI and a Smith "
-      "predictor, and under ADRC, not given and given; all tuned by one rule.");
+      "predictor, and under ADRC, fan not known and given; all tuned by one rule.");
   figure.panel(0, 0)
       .y_label("T (°C)")
       .hide_x_numbers()
@@ -418,7 +418,7 @@ int main(int argc, char** argv) {
     right.line(Column(ways[i].fan.t), ways[i].fan.y, {.name = ways[i].name, .color = colors[i]});
     power.line(Column(ways[i].fan.t), ways[i].fan.u, {.color = colors[i]});
   }
-  right.line(Column(told_t), told_y, {.name = "ADRC, given", .color = Color::green});
+  right.line(Column(told_t), told_y, {.name = "ADRC, fan known", .color = Color::green});
   power.line(Column(told_t), told_u, {.color = Color::green});
   report.add(figure);
   return report.finish();
