@@ -622,10 +622,6 @@ ESOKIT_FUNCTION Check<double> judge(const Identified& found, const Log& log,
   rules.demand(found.own_input > detail::own_input_min, "own_input", found.own_input,
                "is the share of u that does not follow from y, which is too small: record a "
                "moving reference");
-  rules.demand(
-      found.returns >= 0.1, "returns", found.returns,
-      "is how fast y returns by what u follows of y, which is next to nothing: the law of u "
-      "was found and no machine; record a moving reference");
   rules.demand(!found.at_once, "at_once", found.latency.value,
                "is the latency found, but y follows u at once: is y an acceleration or a force? "
                "Record its speed or position, or more rows per second");
@@ -634,6 +630,11 @@ ESOKIT_FUNCTION Check<double> judge(const Identified& found, const Log& log,
                "is the smallest relative error of b0 and too large: what of y follows from u is "
                "not told from the rest; record several steps that last until y settles, or a "
                "sweep");
+  // Behind it: of a log that moves next to nothing this is no finding.
+  rules.demand(
+      found.returns >= 0.1, "returns", found.returns,
+      "is how fast y returns by what u follows of y, which is next to nothing: the law of u "
+      "was found and no machine; record a moving reference");
   rules.demand(
       !(found.other_order.left < 1.0 / std::numbers::e), "order", static_cast<double>(found.order),
       "is the order, but where b0 was found another one leaves less than 1 / e of the mean square: "
