@@ -188,6 +188,54 @@ TEST(InnovationsFit, FindsThePlantThatMadeTheLog) {
   }
 }
 
+// Half of the gradient of the sum of squares is the innovations times their sensitivities, also
+// where the lag holds something that is fitted when the log begins.
+TEST(InnovationsFit, HasTheSensitivitiesOfItsSumOfSquares) {
+  FitData data;
+  data.sample_time = T;
+  esokit::sim::Gaussian noise(7);
+  double y = 0, v = 3;  // left of a u that nobody logged
+  for (int k = 0; k < 1500; ++k) {
+    const bool second = k >= 700;
+    if (k == 700) v = -2;
+    data.u.push_back((k / 150) % 2 == 0 ? 1.0 : -0.5);
+    data.y.push_back(y + 1e-3 * noise.next());
+    for (int i = 0; i < 100; ++i) {
+      v += 1e-2 * T / 0.06 * (data.u.back() - v);
+      y += 1e-2 * T * (20 * v - 3 * y + (second ? 1 : 0));
+    }
+  }
+  data.starts = {0, 700};
+  for (const bool unknown : {true, false}) {
+    data.unknown_before = unknown;
+    InnovationsFit fit(data, {1, 1, true}, {0.5, 300, 1e-4, 0.2, 0.5});
+    const FitPoint at{15, 0.055, 0.8, 2.5};
+    const auto half_square = [&](double w, double latency, double share, double turn) {
+      const FitPoint point{at.bandwidth * std::exp(w), at.latency * std::exp(latency),
+                           std::sqrt(at.lag_share * at.lag_share + share),
+                           at.pole * std::exp(-latency) + turn / (at.latency * std::exp(latency))};
+      const Fit here = fit.at(point);
+      return 0.5 * here.mean_square * static_cast<double>(here.rows);
+    };
+    constexpr double h = 1e-4;
+    const std::vector<double> wanted{
+        (half_square(h, 0, 0, 0) - half_square(-h, 0, 0, 0)) / (2 * h),
+        (half_square(0, h, 0, 0) - half_square(0, -h, 0, 0)) / (2 * h),
+        (half_square(0, 0, h, 0) - half_square(0, 0, -h, 0)) / (2 * h),
+        (half_square(0, 0, 0, h) - half_square(0, 0, 0, -h)) / (2 * h)};
+    const Fit here = fit.at(at);
+    const auto found = fit.sensitivities(here, true);
+    ASSERT_EQ(found.free, (std::vector<int>{0, 1, 2, 3}));
+    for (std::size_t i = 0; i < 4; ++i) {
+      double product = 0;
+      for (std::size_t k = 0; k < data.y.size(); ++k)
+        product += fit.residual()[k] * found.columns[i][k];
+      // Differences to one side have an error of the first order in their step.
+      EXPECT_NEAR(product / wanted[i], 1, 2e-4) << unknown << ' ' << i;
+    }
+  }
+}
+
 // What was measured beside its row, or not at all, is as good as what was measured at it.
 TEST(InnovationsFit, TakesYWhenAndWhereItWasMeasured) {
   constexpr int inner = 80;
