@@ -2,19 +2,14 @@
 """Checks the numbers of pages against what the examples wrote: check_readme.py OUT [--write] PAGE...
 With --pages instead of OUT only those that come from other pages, which needs no run.
 
-A number of a page that comes from a run has a source. It stands in a comment after the number, with
-one source for each of the last numbers of the line before it:
-
-    0.097, 0.093 <!--= sim2: Sim2A, p = 1 -> int e dt; sim2: Sim2A, p = 2 -> int e dt -->
-
-or, so that the page reads well, in PAGE.numbers beside PAGE.md. There each line is a piece of the
-page, which stands there once, and the comment:
+A number of a page that comes from a run has a source. It stands in PAGE.numbers beside PAGE.md, as a
+piece of the page, which stands there once, and one source for each of the last numbers of the piece:
 
     each wins 17 and 26 are ties <!--= choosing/pid#counted: ADRC -> 1; choosing/pid#counted: ADRC -> 2 -->
 
-A page with such a file has to account for every number of its text (outside of code): a line without
-a comment is for what no run gives, as settings and years, and may stand there more than once. A line
-that begins with # says something to the reader of the file.
+The file has to account for every number of the page's text (outside of code): a line without a source
+is for what no run gives, as settings and years, and may stand there more than once. A line `...` leaves
+those out, for a page full of settings. A line that begins with # says something to the reader of the file.
 
 A source is one of
 
@@ -55,6 +50,7 @@ STANDING = re.compile(rf"(?<![\w.+#])(?:{NUMBER})(?![\w]|\.\d)")
 WORDS = {word: n for n, word in enumerate(
     "zero one two three four five six seven eight nine ten eleven twelve".split())}
 WORD = re.compile(r"\b(?:" + "|".join(WORDS) + r")\b", re.IGNORECASE)
+REST = "..."  # in a file of pieces: other numbers of the page come from no run
 COMMENT = re.compile(r"<!--=(.*?)-->", re.DOTALL)
 # What a page shows that no reader takes for a statement of it.
 NOT_TEXT = re.compile(r"^```.*?^```|^    [^\n]*|<!--.*?-->|`[^`\n]*`|\]\([^)]*\)|https?://\S+|^ *\d+\. ",
@@ -175,19 +171,6 @@ def numbers_before(text, begin, end, sources):
     return [Sourced(*span, source) for span, source in zip(spans, wanted)]
 
 
-def of_comments(text):
-    """Numbers with a comment behind them: of its line, from the end of the comment before."""
-    found, last = [], 0
-    for comment in COMMENT.finditer(text):
-        line = text.rfind("\n", 0, comment.start()) + 1
-        begin = max(last, line)
-        if text.count("`", line, comment.start()) % 2:
-            continue  # shown as code
-        found += numbers_before(text, begin, comment.start(), comment[1])
-        last = comment.end()
-    return found
-
-
 def places(piece, text):
     """Where a piece stands, whatever the blanks and line ends in it."""
     pattern = r"\s+".join(re.escape(word) for word in piece.split())
@@ -200,7 +183,7 @@ def of_file(text, listed):
     for line in listed.splitlines():
         comment = COMMENT.search(line)
         piece = COMMENT.sub("", line).strip()
-        if not piece or piece.startswith("#"):
+        if not piece or piece == REST or piece.startswith("#"):
             continue
         stands = places(piece, text)
         if not stands or comment and len(stands) > 1:
@@ -215,12 +198,16 @@ def of_file(text, listed):
 def sourced(page):
     """All numbers of a page that have a source, and what is wrong without looking at a run."""
     text = page.read_text(encoding="utf-8")
-    found, problems = of_comments(text), []
+    said = NOT_TEXT.sub(lambda part: re.sub(r"[^\n]", " ", part[0]), text)
+    shown = re.sub(r"^```.*?^```|`[^`\n]*`", "", text, flags=re.DOTALL | re.MULTILINE)
+    problems = [f"a source in the text: {one[0]}" for one in COMMENT.finditer(shown)]
     listed = page.with_suffix(".numbers")
-    if listed.exists():
-        more, spans, problems = of_file(text, listed.read_text(encoding="utf-8"))
-        found += more
-        said = NOT_TEXT.sub(lambda part: re.sub(r"[^\n]", " ", part[0]), text)
+    if not listed.exists():
+        return [], problems
+    pieces = listed.read_text(encoding="utf-8")
+    found, spans, wrong = of_file(text, pieces)
+    problems += wrong
+    if REST not in pieces.splitlines():
         covered = spans + [(one.start, one.end) for one in found]
         for one in STANDING.finditer(said):
             if not any(start <= one.start() and one.end() <= end for start, end in covered):
@@ -340,18 +327,26 @@ def self_test():
             print(f"self-test, {name}: {found} problems, not {wrong}: {heard}")
 
     a, b = "one: a -> m", "one: b -> m"
-    expect("a right comment", f"0.097 and 0.4 <!--= {a}; {b} -->", None, 0)
-    expect("a wrong number", f"0.098 <!--= {a} -->", None, 1, "says 0.098")
-    expect("a wrong last digit", f"0.0971 <!--= {a} -->", None, 1)
-    expect("a missing run", "0.1 <!--= two: a -> m -->", None, 1, "there is no")
-    expect("a missing row", "0.1 <!--= one: c -> m -->", None, 1, "names no row")
-    expect("no number before it", f"text <!--= {a} -->", None, 1, "no number before")
-    expect("exceeded", f"0.09 <!--= <= {a} -->", None, 1)
-    expect("not exceeded", f"0.1 <!--= <= {a} -->", None, 0)
-    expect("a factor", f"97.2 <!--= {a} * 1000 -->", None, 0)
-    expect("a sum", f"0.4972, 0.0972 <!--= sum one: * -> m; min one: * -> m -->", None, 0)
-    expect("a quotient", f"4.12 <!--= {b} over {a} -->", None, 0)
-    expect("a wrong quotient", f"4.11 <!--= {b} over {a} -->", None, 1)
+
+    def one(name, text, source, wrong, said=""):
+        expect(name, text, f"{text} <!--= {source} -->", wrong, said)
+
+    one("two right numbers", "0.097 and 0.4", f"{a}; {b}", 0)
+    one("a wrong number", "0.098", a, 1, "says 0.098")
+    one("a wrong last digit", "0.0971", a, 1)
+    one("a missing run", "0.1", "two: a -> m", 1, "there is no")
+    one("a missing row", "0.1", "one: c -> m", 1, "names no row")
+    one("no number before it", "text", a, 1, "no number before")
+    one("exceeded", "0.09", f"<= {a}", 1)
+    one("not exceeded", "0.1", f"<= {a}", 0)
+    one("a factor", "97.2", f"{a} * 1000", 0)
+    one("a sum", "0.4972, 0.0972", "sum one: * -> m; min one: * -> m", 0)
+    one("a quotient", "4.12", f"{b} over {a}", 0)
+    one("a wrong quotient", "4.11", f"{b} over {a}", 1)
+    expect("a source in the text", f"0.097 <!--= {a} -->", "...", 1, "a source in the text")
+    expect("a source in the text of a page without a file", f"0.097 <!--= {a} -->", None, 1, "a source in")
+    expect("other numbers", "It is 0.097, or 5.", f"...\nIt is 0.097 <!--= {a} -->", 0)
+    expect("a wrong one beside others", "It is 0.098, or 5.", f"...\nIt is 0.098 <!--= {a} -->", 1, "says")
     expect("a file", "It is 0.097, set by 3.", f"It is 0.097 <!--= {a} -->\nset by 3\n", 0)
     expect("a file over line ends", "It\nis 0.097.", f"It is 0.097 <!--= {a} -->", 0)
     expect("a wrong number in both", "It is 0.098.", f"It is 0.098 <!--= {a} -->", 1, "says 0.098")
@@ -361,17 +356,17 @@ def self_test():
     expect("a piece that stands twice", "is 0.4, is 0.4", f"is 0.4 <!--= {b} -->", 3, "stands 2 times")
     expect("a changed page", "It is 0.099.", f"It is 0.097 <!--= {a} -->", 2)
     expect("code, names and links", "`x = 5` M4F C++20 [a](b5.md)\n```\n7\n```\n1. first", "", 0)
-    expect("the 4 of M4F is a name", f"0.4 on an M4F <!--= {b} -->", None, 0)
-    expect("a comment as code", "`0.4 <!--= none: a -> m -->`", None, 0)
+    one("the 4 of M4F is a name", "0.4 on an M4F", b, 0)
+    expect("a comment as code", "`0.4 <!--= none: a -> m -->`", "", 0)
     expect("a thousand", "1,000 runs", "", 1, "1,000 is not in")
-    expect("lines of a file", f"{len(Path(__file__).read_text().splitlines())} <!--= lines "
-           "examples/common/check_readme.py -->", None, 0)
-    expect("a word", "one file <!--= files examples/common/check_readme.py -->", None, 0)
-    expect("a wrong word", "two files <!--= files examples/common/check_readme.py -->", None, 1)
-    expect("no file", "1 <!--= files examples/common/none -->", None, 1, "names no file")
-    expect("a table of a page", "33 <!--= README.md#nothing such: a -> b -->", None, 1, "no line of")
-    expect("written", f"It is 0.098, 3.0 <!--= {b} -->", f"It is 0.098 <!--= {a} -->", 0, "",
-           f"It is 0.097, 0.4 <!--= {b} -->")
+    one("lines of a file", f"{len(Path(__file__).read_text().splitlines())}",
+        "lines examples/common/check_readme.py", 0)
+    one("a word", "one file", "files examples/common/check_readme.py", 0)
+    one("a wrong word", "two files", "files examples/common/check_readme.py", 1)
+    one("no file", "1", "files examples/common/none", 1, "names no file")
+    one("a table of a page", "33", "README.md#nothing such: a -> b", 1, "no line of")
+    expect("written", "It is 0.098, 3.0", f"It is 0.098 <!--= {a} -->\n0.098, 3.0 <!--= {b} -->", 0, "",
+           "It is 0.097, 0.4")
     print(f"{passed} passed, {failed} failed")
     return failed == 0
 
