@@ -18,11 +18,12 @@ from pathlib import Path
 
 MOST = 35
 CODE = re.compile(r"^```.*?^```|^    .*?$|<!--.*?-->", re.DOTALL | re.MULTILINE)
-END = re.compile(r"(?<![ .]\w)(?<!e\.g)(?<!et al)[.!?](?=\s|$)|\n\s*\n|\n\s*(?:[-*]|\d+\.) |\n#+ |\||\n(?=\|)")
+HEADING = re.compile(r"^#+ .*$", re.MULTILINE)
+END = re.compile(r"(?<![ .(][A-Z])(?<!^[A-Z])(?<!e\.g)(?<!i\.e)(?<!et al)[.!?](?=\s|$)|\n\s*\n|\n\s*(?:[-*]|\d+\.) |\||\n(?=\|)")
 
 
 def sentences(page):
-    text = CODE.sub("\n\n", page)
+    text = HEADING.sub(lambda one: f"\n\n{one[0]}\n\n", CODE.sub("\n\n", page))
     text = re.sub(r"!?\[([^\]]*)\]\([^)]*\)", r"\1", text)
     return [" ".join(part.split()) for part in END.split(text) if part.strip()]
 
