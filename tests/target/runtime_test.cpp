@@ -47,8 +47,6 @@ constexpr const char* calls[] = {"restart_at y",
                                  "take_over u",
                                  "within u = -",
                                  "harden",
-                                 "law_for r e0 e1 e2 = -",
-
                                  "scaled_bound bound = -",
                                  "scale_found change",
                                  "predicted_y x1 x2 x3 u = -",
@@ -69,7 +67,6 @@ constexpr const char* calls[] = {"restart_at y",
                                  "filter_to_limit",
                                  "control_by y =",
                                  "control_blind =",
-                                 "refer r",
                                  "take_output u",
                                  "track",
                                  "settle",
@@ -126,6 +123,7 @@ detail::RecordedDesign design_of(Random& random) {
   d.compensates = kind == 2;
   d.predictive = kind == 3;
   d.waits = is();
+  d.options.moving_reference = (kind == 0 || d.predictive) && is();
   const int law = random.index(3);
   d.law.kind = law == 0 ? RunningLaw::none : law == 1 ? RunningLaw::schedule : RunningLaw::filter;
   d.law.returns = law == 2 && is();
@@ -144,7 +142,7 @@ detail::RecordedDesign design_of(Random& random) {
     d.wrap.gated = d.wrap.period > 0 && (d.gate.threshold > 0 || d.law.watches);
     d.known.on = law != 1 && is();
     if (d.wrap.period > 0 && d.is_controller && !d.error_based && !d.compensates && law != 1 &&
-        !d.known.on) {
+        !d.known.on && !d.options.moving_reference) {
       d.wrap.angle = "z1";
     }
     d.guard.on = stands && d.gain_is_kept && is();
@@ -171,7 +169,9 @@ detail::RecordedDesign design_of(Random& random) {
   if (d.options.settings_in_struct) d.settings.assign(d.members.size(), false);
   for (const char* call : calls) add_call(d, call);
   add_call(d, d.wrap.period > 0 ? "rest_at y u angle" : "rest_at y u");
-  if (law != 1) add_call(d, "law r = -");
+  const std::string r = d.options.moving_reference ? "r r1 r2" : "r";
+  add_call(d, "refer " + r);
+  add_call(d, law == 1 ? "law_for " + r + " e0 e1 e2 = -" : "law " + r + " = -");
   add_call(d, stands ? "arm_by k1 k2 k3" : "arm_by");
   return d;
 }

@@ -271,6 +271,53 @@ TEST(StructuredText, OfControllers) {
 #endif
 }
 
+/// A reference that moves: r, r1, r2.
+template <class C>
+void moves(std::uint64_t seed) {
+  SCOPED_TRACE(testing::internal::GetTypeName<C>());
+  using V = typename C::scalar_type;
+  C controller = C::make(config<C>(8)).value();
+  const auto block =
+      to_structured_text(controller, {.name = "loop", .moving_reference = true}).value();
+  Samples samples("y no_y r r1 r2 u_held starts reports : u status" +
+                  estimate_names(ObserverOf<C>::size));
+  ChainPlant plant(C::order, 0.0078125, 8, 1.5);
+  Random random(seed + asked("ESOKIT_WRITTEN_SEED", 0));
+  for (int k = 0; k < samples_each; ++k) {
+    plant.step(static_cast<double>(controller.output()));
+    V y = static_cast<V>(plant.output());
+    if constexpr (observer_traits<ObserverOf<C>>.wraps_output) y = std::remainder(y, V(2.5));
+    y = odd(random, y);
+    Vector<V, 3> r{};
+    for (int i = 0; i < 3; ++i) {
+      r(i) = odd(random, static_cast<V>(std::pow(0.5, i) * std::sin(0.004 * k + 1.6 * i)));
+    }
+    const bool lost = random.index(12) == 0;
+    const V u = lost ? controller.update_without_measurement(r) : controller.update(y, r);
+    samples.number(y).count(lost).number(r(0)).number(r(1)).number(r(2)).number(V(0));
+    samples.count(0).count(0).number(u).count(static_cast<unsigned>(controller.status()));
+    samples.estimates(controller.observer());
+  }
+  interprets(block, samples);
+}
+
+TEST(StructuredText, OfAReferenceThatMoves) {
+  if (!there("python3")) GTEST_SKIP() << "no python3";
+  moves<Adrc<LinearEso<2, double>>>(701);
+#ifndef ESOKIT_ONE_TYPE
+  moves<Adrc<WrappedOutput<LinearEso<2, float>>>>(711);
+#endif
+  const auto block = to_structured_text(
+      PredictiveAdrc<LinearEso<2>>::make(
+          {.observer = observer_config<LinearEso<2>>(8), .controller_bandwidth = 4})
+          .value(),
+      {.name = "loop", .moving_reference = true});
+  ASSERT_TRUE(block);
+  EXPECT_NE(block->find("loop_prepare(o := o, next_r := next_r, next_r1 := next_r1, next_r2 := "
+                        "next_r2)"),
+            std::string::npos);
+}
+
 TEST(StructuredText, OfObservers) {
   if (!there("python3")) GTEST_SKIP() << "no python3";
   observes_in_text<CascadeEso<1, 2, double>>(71);

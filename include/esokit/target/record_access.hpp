@@ -46,8 +46,8 @@ struct RecordAccess {
     return c.loop_.limiter_;
   }
   /// u of the law for the present estimate, before the limits; as if no start hold were left.
-  template <class C, class S>
-  static S law(C& c, const S& reference) noexcept {
+  template <class C, class Given>
+  static auto law(C& c, const Given& reference) noexcept {
     c.loop_.mode_ = LoopMode::running;
     if constexpr (requires { c.judged(reference); }) {
       return c.judged(reference);
@@ -131,9 +131,9 @@ struct RecordAccess {
     return armed<Numbers>(c);
   }
   /// The lists around which its text goes.
-  /// @param waits whether the limiter's steps may wait
+  /// @param waits whether the limiter's steps may wait @param moves whether the reference does
   template <class Number, class Observer, class Add>
-  static void add_phases(bool waits, const Add& add) {
+  static void add_phases(bool waits, bool moves, const Add& add) {
     using Numbers = std::vector<Number>;
     constexpr RunningLaw runs = kind_of<LawOf<Observer>>;
     constexpr int size = Observer::size;
@@ -148,9 +148,10 @@ struct RecordAccess {
     });
     add("control_blind", "", true,
         [](auto& c, const auto&) { return Numbers{c.control_without_measurement()}; });
-    add("refer", "r", false, [](auto& c, const auto& in) {
+    const std::string motion = moves ? "r " + numbered("r", Observer::order) : "r";
+    add("refer", motion, false, [](auto& c, const auto& in) {
       for (Number& one : c.reference_) one = Number(0.0);
-      c.reference_[0] = in[0];
+      for (std::size_t i = 0; i < in.size(); ++i) c.reference_[i] = in[i];
       return Numbers{};
     });
     add("take_output", "u", false, [](auto& c, const auto& in) {
@@ -402,17 +403,21 @@ struct RecordAccess {
       });
     }
   }
-  /// u of the law for given estimates, where the observer does not always publish its own.
-  template <class C, class Numbers>
-  static auto law_for(C& c, const Numbers& in) noexcept {
+  /// u of the law; for estimates that are given from in[next] on, where the observer does not
+  /// always publish its own.
+  template <class C, class Given, class Numbers>
+  static auto law_for(C& c, const Given& reference, const Numbers& in, std::size_t next) noexcept {
     auto& o = c.observer();
-    o.numbers_.laws[0].age_ = std::uint32_t{0};  // it publishes what it keeps
-    const auto kept = o.rest_.published;
-    std::size_t next = 1;
-    for (auto& given : o.rest_.published) given = in[next++];
-    const auto u = law(c, in[0]);
-    o.rest_.published = kept;
-    return u;
+    if constexpr (!blanks<std::remove_cvref_t<decltype(o)>>) {
+      return law(c, reference);
+    } else {
+      o.numbers_.laws[0].age_ = std::uint32_t{0};  // it publishes what it keeps
+      const auto kept = o.rest_.published;
+      for (auto& given : o.rest_.published) given = in[next++];
+      const auto u = law(c, reference);
+      o.rest_.published = kept;
+      return u;
+    }
   }
   template <class O>
   static constexpr bool blanks = requires(O& o) {

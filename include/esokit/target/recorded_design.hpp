@@ -22,9 +22,9 @@ namespace esokit {
 
 namespace detail {
 
-/// The rules for the options.
+/// The rules for the options. @param takes_motion whether there is a law that takes r', ..
 template <class V>
-[[nodiscard]] Rules<V> checked_options(const CodeOptions& options) {
+[[nodiscard]] Rules<V> checked_options(const CodeOptions& options, bool takes_motion = true) {
   Rules<V> rules;
   constexpr const char* identifier =
       "must be an identifier of C: this is the place of its first wrong character";
@@ -39,7 +39,10 @@ template <class V>
       .demand(1 <= options.self_test_samples && options.self_test_samples <= 10000,
               "self_test_samples", static_cast<V>(options.self_test_samples), "must be 1 .. 10000")
       .demand(!leaves_comment(options.comment), "comment", V(0),
-              "must not begin or end a comment, nor a line of it with a backslash");
+              "must not begin or end a comment, nor a line of it with a backslash")
+      .demand(
+          takes_motion || !options.moving_reference, "moving_reference", V(1),
+          "needs a law that takes r', ..: Adrc, not of the error-based form, or PredictiveAdrc");
   return rules;
 }
 
@@ -319,7 +322,8 @@ class DesignRecorder {
         design.compensates) {
       return {};
     }
-    constexpr bool elsewhere = RecordAccess::blanks<Core> || RecordAccess::knows<Observer>;
+    const bool elsewhere = RecordAccess::blanks<Core> || RecordAccess::knows<Observer> ||
+                           design.options.moving_reference;
     if (elsewhere ? design.softens : !detail::take_angle(design)) {
       return Error<V>{"soften", V(1), "of an angle is not written for this observer"};
     }
@@ -375,17 +379,40 @@ class DesignRecorder {
   Recorder<Subject> recorder_;
 };
 
-/// Samples for the self-test: what y is does not matter. @param step gives the result for y and r
-template <class V, class Step>
-std::vector<std::array<double, 3>> self_test_samples(int count, Step&& step) {
-  std::vector<std::array<double, 3>> samples;
+/// Samples for the self-test: what y is does not matter. @param step gives the result for y and the
+/// `inputs` beside it, (u) or (r, ..)
+template <class V, int inputs = 1, class Step>
+std::vector<std::vector<double>> self_test_samples(int count, Step&& step) {
+  std::vector<std::vector<double>> samples;
   for (int k = 0; k < count; ++k) {
-    const V r = static_cast<V>((k / 10) % 2 == 0 ? 1.0 : -0.5);
     const V y = static_cast<V>(0.25 * ((k * 37) % 16) - 1.5);
-    samples.push_back(
-        {static_cast<double>(y), static_cast<double>(r), static_cast<double>(step(y, r))});
+    Vector<V, inputs> beside;
+    for (int i = 0; i < inputs; ++i) {
+      beside(i) = static_cast<V>(i == 0 ? ((k / 10) % 2 == 0 ? 1.0 : -0.5)
+                                        : 0.125 * ((k * 11 + i) % 9) - 0.5);
+    }
+    std::vector<double> sample{static_cast<double>(y)};
+    for (const V& one : beside) sample.push_back(static_cast<double>(one));
+    sample.push_back(static_cast<double>(step(y, beside)));
+    samples.push_back(std::move(sample));
   }
   return samples;
+}
+
+/// The self-test of a controller.
+template <class C>
+void take_samples(RecordedDesign& design, C played) {
+  using V = typename C::scalar_type;
+  const int count = design.options.self_test_samples;
+  if constexpr (requires { typename C::Reference; }) {
+    if (design.options.moving_reference) {
+      design.samples = self_test_samples<V, C::order + 1>(
+          count, [&](V y, const auto& motion) { return played.update(y, motion); });
+      return;
+    }
+  }
+  design.samples =
+      self_test_samples<V>(count, [&](V y, const auto& r) { return played.update(y, r(0)); });
 }
 
 /// Records the calls of a controller without its adapters, of which the design knows already.
@@ -403,12 +430,19 @@ template <class Bare, class BareObserver>
                     Access::rest(Access::at_rest(c.observer()), in, around_angle);
                     return Numbers{};
                   });
-  if constexpr (Access::blanks<BareObserver>) {
-    maker.add("law_for", "r " + numbered("e", BareObserver::size, 0), true,
-              [](auto& c, const Numbers& in) { return Numbers{Access::law_for(c, in)}; });
-  } else {
-    maker.add("law", "r", true,
-              [](auto& c, const Numbers& in) { return Numbers{Access::law(c, in[0])}; });
+  const bool blanks = Access::blanks<BareObserver>;
+  const std::string law = blanks ? "law_for" : "law";
+  const std::string estimates = blanks ? " " + numbered("e", BareObserver::size, 0) : "";
+  if (!design.options.moving_reference) {
+    maker.add(law, "r" + estimates, true,
+              [](auto& c, const Numbers& in) { return Numbers{Access::law_for(c, in[0], in, 1)}; });
+  } else if constexpr (requires { typename Bare::Reference; }) {
+    maker.add(law, "r " + numbered("r", Bare::order) + estimates, true,
+              [](auto& c, const Numbers& in) {
+                typename std::remove_cvref_t<decltype(c)>::Reference::All motion;
+                for (int i = 0; i <= Bare::order; ++i) motion(i) = in[static_cast<std::size_t>(i)];
+                return Numbers{Access::law_for(c, motion, in, Bare::order + 1)};
+              });
   }
   maker.add("limit", "u", true, [](auto& c, const Numbers& in) {
     return Numbers{Access::limited(Access::loop(c), in[0])};
@@ -453,7 +487,8 @@ Expected<RecordedDesign, Error<typename C::scalar_type>> recorded_design(
   using Bare = typename WithoutAdapter<C>::type;
   using Maker = DesignRecorder<Bare, typename WithoutAdapter<typename Of::type>::type>;
 
-  if (const auto rules = checked_options<V>(options); !rules) return rules.error();
+  constexpr bool takes_motion = !Of::error_based && requires { controller.gains(); };
+  if (const auto rules = checked_options<V>(options, takes_motion); !rules) return rules.error();
   const Bare bare = without_adapter(controller);
   Maker maker(bare, options);
   RecordedDesign& design = maker.design;
@@ -473,9 +508,7 @@ Expected<RecordedDesign, Error<typename C::scalar_type>> recorded_design(
 
   if (auto ok = record_controller(maker); !ok) return ok.error();
   if (design.error_based) design.input_gain = -design.input_gain;
-  C played = controller;
-  design.samples = self_test_samples<V>(options.self_test_samples,
-                                        [&](V y, V r) { return played.update(y, r); });
+  take_samples(design, controller);
   return design;
 }
 
@@ -487,15 +520,15 @@ Expected<RecordedDesign, Error<typename Observer::scalar_type>> recorded_design(
   using Bare = typename WithoutAdapter<Observer>::type;
   using Maker = DesignRecorder<Bare, Bare>;
 
-  if (const auto rules = checked_options<V>(options); !rules) return rules.error();
+  if (const auto rules = checked_options<V>(options, false); !rules) return rules.error();
   const Bare bare = without_adapter(observer);
   Maker maker(bare, options);
   take_adapters(maker.design, observer);
   maker.design.law = RecordAccess::law_numbers(RecordAccess::core(bare));
   if (auto ok = maker.record(Itself{}, NoName{}); !ok) return ok.error();
   Observer played = observer;
-  maker.design.samples = self_test_samples<V>(options.self_test_samples, [&](V y, V u) {
-    (void)played.update(y, u);
+  maker.design.samples = self_test_samples<V>(options.self_test_samples, [&](V y, const auto& u) {
+    (void)played.update(y, u(0));
     return played.total_disturbance();
   });
   return maker.design;
@@ -529,8 +562,9 @@ Expected<RecordedDesign, Error<typename C::scalar_type>> recorded_design(
     return Numbers{};
   });
   RecordAccess::add_phases<Number, Observer>(
-      design.waits, [&]<class Call>(std::string_view name, std::string_view arguments,
-                                    bool has_output, const Call&) {
+      design.waits, options.moving_reference,
+      [&]<class Call>(std::string_view name, std::string_view arguments, bool has_output,
+                      const Call&) {
         maker.add(name, arguments, has_output,
                   [](auto& c, const Numbers& in) { return Call{}(c, in); });
       });
@@ -538,9 +572,7 @@ Expected<RecordedDesign, Error<typename C::scalar_type>> recorded_design(
     return at == &c.output() ? "u_last" : "";
   };
   if (auto ok = maker.record(OfPredictive{}, name_of); !ok) return ok.error();
-  C played = controller;
-  design.samples = self_test_samples<V>(options.self_test_samples,
-                                        [&](V y, V r) { return played.update(y, r); });
+  take_samples(design, controller);
   return design;
 }
 

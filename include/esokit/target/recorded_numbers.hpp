@@ -23,6 +23,11 @@ struct CodeOptions {
   int self_test_samples = 100;      ///< samples of the self-test, 1 .. 10000
   bool watched = false;  ///< keeps what a HealthMonitor looks at: innovation, and u that was asked
 
+  /// `update` takes r, r', .., r^(n) instead of r alone, for a reference that moves, such as what
+  /// `name_motion` of a SmoothProfile gives; of a law that takes them: Adrc, not of the error-based
+  /// form, and PredictiveAdrc. Not in fixed point.
+  bool moving_reference = false;
+
   /// Gains, those of the law, and limits in a struct that can be changed while it runs, instead of
   /// constants: in C, for gains that do not depend on the innovation or the time.
   bool settings_in_struct = false;
@@ -197,10 +202,19 @@ struct RecordedDesign {
   bool waits = false;  ///< whether it may be too small for the digits of u
   bool error_based = false;
   bool softens = false;
-  bool compensates = false;                      ///< r is the output of another controller
-  bool predictive = false;                       ///< in two phases
-  unsigned hold = 0;                             ///< of one of these: samples of its start hold
-  std::vector<std::array<double, 3>> samples{};  ///< y, r or u, and the result
+  bool compensates = false;                    ///< r is the output of another controller
+  bool predictive = false;                     ///< in two phases
+  unsigned hold = 0;                           ///< of one of these: samples of its start hold
+  std::vector<std::vector<double>> samples{};  ///< y, r or u, and the result
+
+  /// How many numbers the reference is.
+  [[nodiscard]] int references() const { return options.moving_reference ? order + 1 : 1; }
+  /// Their names: `r`, r1, ..
+  [[nodiscard]] std::vector<std::string> references(const std::string& r) const {
+    std::vector<std::string> all{r};
+    for (int i = 1; i < references(); ++i) all.push_back(r + std::to_string(i));
+    return all;
+  }
 };
 
 }  // namespace detail

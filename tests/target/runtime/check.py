@@ -27,7 +27,7 @@ GUARDS = [set(), {"GUARDED"}, {"GUARDED", "BOUNDED"}, {"GUARDED", "LEAKS"}, {"GU
           {"GUARDED", "BOUNDED", "BOUND_OF_U", "LEAKS"}]
 W = [set(), {"MEASURED", "ONE_W"}, {"MEASURED"}]
 FLAGS = OF_LOOPS + ["HOLDS_AT_START", "SETTINGS", "DELAYED", "GATED", "WRAPPED", "KNOWN", "MAPPED", "SINGLE",
-                    "RECOVERS"]
+                    "RECOVERS", "MOVES"]
 DEVIATIONS = ("2.5", "15.5", "21.15")
 ALL = sorted({*FLAGS, "GATED_ANGLE", "LAW_OF_ANGLE"}.union(*KINDS, *LAWS, *GUARDS, *W))
 
@@ -48,6 +48,8 @@ def valid(has):
         or ("SOFTENS" in has and "COMPENSATOR" in has)
         or {"MAPPED", "SOFTENS"} <= has
         or ("KNOWN" in has and "SCHEDULE" in has)
+        or ("MOVES" in has and ("ERROR_BASED" in has or "COMPENSATOR" in has or
+                                not (loop or "PREDICTIVE" in has)))
         or ("WATCHED" in has and "GATED" in has))
 
 
@@ -56,7 +58,7 @@ def completed(has):
     has = set(has)
     if "WRAPPED" in has and has & {"GATED", "WATCHED"}:
         has.add("GATED_ANGLE")
-    if {"WRAPPED", "CONTROLLER"} <= has and not has & {"ERROR_BASED", "COMPENSATOR", "SCHEDULE", "KNOWN"}:
+    if {"WRAPPED", "CONTROLLER"} <= has and not has & {"ERROR_BASED", "COMPENSATOR", "SCHEDULE", "KNOWN", "MOVES"}:
         has.add("LAW_OF_ANGLE")
     return frozenset(has)
 

@@ -29,7 +29,6 @@ typedef double real;
   real published_0;
 #define DESIGN_SETTINGS real limit_1;
 #define DESIGN_INIT o->z1 = number(0.0);
-#define DESIGN_VECTORS {number(0.0), number(0.0), number(0.0)}
 #define DESIGN_GAINS {number(0.5), number(0.25), number(0.125)}
 #if ESOKIT_RECOVERS
 #define DESIGN_RECOVERED , {DESIGN_RECOVERY}, 1u
@@ -93,6 +92,28 @@ typedef double real;
 #define LARGEST number(1e30)
 #define GAINS 3
 #define SAMPLES 1
+#if ESOKIT_MOVES
+#define DESIGN_R real r, real r1, real r2
+#define DESIGN_R_GIVEN r, r1, r2
+#define DESIGN_NEXT_R real next_r, real next_r1, real next_r2
+#define DESIGN_NEXT_R_GIVEN next_r, next_r1, next_r2
+#define DESIGN_MOTION r1, r2
+#define DESIGN_R_AT_REST y, number(0.0), number(0.0)
+#define DESIGN_R_IS_FINITE is_finite(r) && is_finite(r1) && is_finite(r2)
+#define DESIGN_SAMPLE_R samples[i][1], samples[i][2], samples[i][3]
+#define DESIGN_VECTORS {number(0.0), number(0.0), number(0.0), number(0.0), number(0.0)}
+#define COLUMNS 5u
+#else
+#define DESIGN_R real r
+#define DESIGN_R_GIVEN r
+#define DESIGN_NEXT_R real next_r
+#define DESIGN_NEXT_R_GIVEN next_r
+#define DESIGN_R_AT_REST y
+#define DESIGN_R_IS_FINITE is_finite(r)
+#define DESIGN_SAMPLE_R samples[i][1]
+#define DESIGN_VECTORS {number(0.0), number(0.0), number(0.0)}
+#define COLUMNS 3u
+#endif
 #define ROWS 1u
 #define STATES 3u
 #define ORDER 2u
@@ -152,7 +173,7 @@ typedef double real;
   bool take_over(esokit_state *o, real u); \
   bool within(const esokit_state *o, real u, real *u_out); \
   bool harden(esokit_state *o); \
-  bool law_for(const esokit_state *o, real r, real e0, real e1, real e2, real *u_out); \
+  bool law_for(const esokit_state *o, DESIGN_R, real e0, real e1, real e2, real *u_out); \
   DESIGN_LAW bool scaled_bound(const esokit_state *o, real bound, real *u_out); \
   bool scale_found(esokit_state *o, real change); \
   bool predicted_y(const esokit_state *o, real x1, real x2, real x3, real u, real *u_out); \
@@ -173,7 +194,7 @@ typedef double real;
   bool filter_to_limit(esokit_state *o); \
   bool control_by(esokit_state *o, real y, real *u_out); \
   bool control_blind(esokit_state *o, real *u_out); \
-  bool refer(esokit_state *o, real r); \
+  bool refer(esokit_state *o, DESIGN_R); \
   bool take_output(esokit_state *o, real u); \
   bool track(esokit_state *o); \
   bool settle(esokit_state *o); \
@@ -194,10 +215,10 @@ typedef double real;
   bool arm_by(esokit_state *o); \
   bool arm_long(esokit_state *o, real contraction, real samples);
 #elif ESOKIT_FILTER
-#define DESIGN_LAW bool law(const esokit_state *o, real r, real *u_out);
+#define DESIGN_LAW bool law(const esokit_state *o, DESIGN_R, real *u_out);
 #define DESIGN_PHASES bool arm_by(esokit_state *o);
 #else
-#define DESIGN_LAW bool law(const esokit_state *o, real r, real *u_out);
+#define DESIGN_LAW bool law(const esokit_state *o, DESIGN_R, real *u_out);
 #define DESIGN_PHASES bool arm_by(esokit_state *o, real k1, real k2, real k3);
 #endif
 

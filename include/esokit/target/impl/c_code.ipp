@@ -84,6 +84,7 @@ class CDesign {
     set_rows();
     set_state();
     set_words();
+    set_reference();
     if (design.options.settings_in_struct) {
       text_.constant("DESIGN_MARK", mark);
       settings_ = settings(mark);
@@ -124,6 +125,7 @@ class CDesign {
     text_.feature("ESOKIT_PREDICTIVE", d.predictive);
     text_.feature("ESOKIT_WAITS", d.predictive && d.waits);
     text_.feature("ESOKIT_ERROR_BASED", d.error_based);
+    text_.feature("ESOKIT_MOVES", d.options.moving_reference);
     text_.feature("ESOKIT_COMPENSATOR", d.compensates);
     text_.feature("ESOKIT_SOFTENS", d.softens);
     text_.feature("ESOKIT_DIVIDED", d.loop.divider > 1);
@@ -405,14 +407,45 @@ class CDesign {
     text_.replace("DESIGN_Y", d.first_state);
     text_.replace("DESIGN_ANGLE", d.wrap.angle);
     text_.replace("esokit_DESIGN_SET", options.name + "_" + options.settings_name);
-    text_.replace("DESIGN_REFERENCE",
-                  d.compensates ? "the u0 of the controller that is helped" : "the reference");
     text_.replace("DESIGN_LAST", std::to_string(d.size - 1));
-    text_.replace("DESIGN_COLUMNS", d.predictive      ? "y, next r, u"
-                                    : d.is_controller ? "y, r, u"
-                                                      : "y, u, the disturbance");
     text_.lines("DESIGN_VECTORS", writer_.rows(d.samples));
   }
+
+  /// What the reference is: r, or with its motion.
+  void set_reference() {
+    const RecordedDesign& d = design_;
+    const auto names = d.references("r");
+    const auto declared = [&](const char* r) {
+      return listed(d.references(r), [&](const auto& one) { return writer_.real() + " " + one; });
+    };
+    const auto itself = [](const std::string& name) { return name; };
+    text_.replace("DESIGN_R", declared("r"));
+    text_.replace("DESIGN_R_GIVEN", listed(names, itself));
+    text_.replace("DESIGN_NEXT_R", declared("next_r"));
+    text_.replace("DESIGN_NEXT_R_GIVEN", listed(d.references("next_r"), itself));
+    text_.replace("DESIGN_MOTION",
+                  listed(std::vector<std::string>(names.begin() + 1, names.end()), itself));
+    text_.replace("DESIGN_R_AT_REST", listed(names, [&](const std::string& name) {
+                    return name == "r" ? "y" : writer_.number(0);
+                  }));
+    std::string finite;
+    for (const auto& name : names) finite += (finite.empty() ? "" : " && ") + is_finite(name);
+    text_.replace("DESIGN_R_IS_FINITE", finite);
+    text_.replace("DESIGN_REFERENCE", d.compensates ? "the u0 of the controller that is helped"
+                                      : names.size() > 1
+                                          ? "the reference, with its derivatives r1, .."
+                                          : "the reference");
+    text_.constant("COLUMNS", std::to_string(names.size() + 2) + "u");
+    text_.replace("DESIGN_SAMPLE_R", counted(d.references(), [](int i) {
+                    return "samples[i][" + std::to_string(i + 1) + "]";
+                  }));
+    text_.replace(
+        "DESIGN_COLUMNS",
+        !d.predictive && !d.is_controller
+            ? "y, u, the disturbance"
+            : "y, " + listed(d.references(d.predictive ? "next r" : "r"), itself) + ", u");
+  }
+  static std::string is_finite(const std::string& name) { return "is_finite(" + name + ")"; }
 
   std::string recovery() const {
     return listed(design_.recovery, [](unsigned due) { return std::to_string(due) + "u"; });

@@ -505,6 +505,9 @@ class FixedText {
 
 ESOKIT_FUNCTION Expected<FixedCode, Error<double>> fixed_code(const RecordedDesign& recorded,
                                                               const FixedPointOptions& options) {
+  if (recorded.options.moving_reference) {
+    return Error<double>{"moving_reference", 1, "is not written in fixed point"};
+  }
   const bool given = options.settings_for != nullptr;
   FixedDesign design(recorded, options, given ? &options.settings_for->layout : nullptr);
   std::vector<FixedLayout> others;

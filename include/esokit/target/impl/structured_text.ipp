@@ -60,9 +60,9 @@ END_IF;
 )";
 
 inline constexpr const char* st_controller = R"($HOLD no_y THEN
-  u := $name_update_without_measurement(o := o, r := r);
+  u := $name_update_without_measurement(o := o, $R);
 ELSE
-  u := $name_update(o := o, y := y, r := r);
+  u := $name_update(o := o, y := y, $R);
 END_IF;
 mode := UDINT_TO_UINT(o.mode);
 status := UDINT_TO_UINT(o.status);
@@ -73,7 +73,7 @@ inline constexpr const char* st_predictive = R"(IF no_y THEN
 ELSE
   u := $name_control(o := o, y := y);
 END_IF;
-flags := $name_prepare(o := o, next_r := next_r);
+flags := $name_prepare(o := o, $R);
 status := UDINT_TO_UINT(flags);
 mode := UDINT_TO_UINT(o.mode);
 )";
@@ -124,13 +124,16 @@ ESOKIT_FUNCTION StructuredText structured_text(const RecordedDesign& design) {
   StBlock block(c_code(design), design.options, design.single, "_init");
   const auto number = [&](double x) { return StTranslator::number(writer.number(x)); };
   const bool controls = design.is_controller;
+  const auto references = design.references(design.predictive ? "next_r" : "r");
   block.input("y : $real", "the measurement");
   block.input("no_y : BOOL", "TRUE: there is none at this sample");
   if (controls || design.predictive) {
-    block.input(design.predictive ? "next_r : $real" : "r : $real",
-                design.predictive    ? "the reference at the next sample"
-                : design.compensates ? "u0 of the controller that is helped"
-                                     : "the reference");
+    for (const std::string& r : references) {
+      block.input(r + " : $real", r != references[0]   ? "its derivative"
+                                  : design.predictive  ? "the reference at the next sample"
+                                  : design.compensates ? "u0 of the controller that is helped"
+                                                       : "the reference");
+    }
     block.input("u_held : $real", "what the actuator held, if starts or reports");
     block.input("starts : BOOL",
                 "TRUE: takes over a plant at rest at y under u_held, before the sample");
@@ -210,9 +213,12 @@ ESOKIT_FUNCTION StructuredText structured_text(const RecordedDesign& design) {
         "missed := UDINT_TO_UINT(o.gap);\n";
   }
   const bool gates = design.gate.threshold > 0 || design.law.watches;
-  block.body = filled(block.body, {{"$HOLD", !guards    ? (controls ? "IF" : "")
-                                             : controls ? hold
-                                                        : st_hold_observer}});
+  block.body =
+      filled(block.body,
+             {{"$HOLD", !guards    ? (controls ? "IF" : "")
+                        : controls ? hold
+                                   : st_hold_observer},
+              {"$R", listed(references, [](const std::string& r) { return r + " := " + r; })}});
   StructuredText all = block.text(filled(
       st_head,
       {{"$FLAGS", design.wrap.period > 0 ? ",\n   64 y was refused as an outlier, 128 y moved "

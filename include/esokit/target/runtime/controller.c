@@ -88,19 +88,23 @@ static void judge_missing(esokit_state *o)
 }
 
 /* u of the law. */
-static real wanted(esokit_state *o, real r)
+static real wanted(esokit_state *o, DESIGN_R)
 {
   real u = 0.0;
 #if ESOKIT_LAW_OF_ANGLE
   (void)law(o, wrapped(r - o->DESIGN_ANGLE), &u);
 #elif ESOKIT_WRAPPED && !ESOKIT_ERROR_BASED && !ESOKIT_COMPENSATOR
   const real angle = estimate_at(o, 0u);
+#if ESOKIT_MOVES
+  (void)law(o, angle + wrapped(r - angle), DESIGN_MOTION, &u);
+#else
   (void)law(o, angle + wrapped(r - angle), &u);
+#endif
 #elif ESOKIT_GUARDED && ESOKIT_COMPENSATOR
   (void)law(o, -0.0, &u);
   u = r + (u * o->input_factor);
 #else
-  (void)law(o, r, &u);
+  (void)law(o, DESIGN_R_GIVEN, &u);
 #endif
 #if ESOKIT_GUARDED && !ESOKIT_SOFTENS && !ESOKIT_COMPENSATOR
   u = u * o->input_factor;
@@ -132,19 +136,19 @@ static real other_output(esokit_state *o)
 }
 
 /* After the observer's part of a sample. */
-static real put_out(esokit_state *o, real r)
+static real put_out(esokit_state *o, DESIGN_R)
 {
   bool runs;
   real u = r; /* which has to be finite where it is not used, too */
   judge_missing(o);
   runs = o->mode == ESOKIT_RUNNING;
-#if ESOKIT_ERROR_BASED
-  if (!is_finite(r)) {
+#if ESOKIT_ERROR_BASED || ESOKIT_MOVES
+  if (!(DESIGN_R_IS_FINITE)) {
     o->status = (uint16_t)(o->status | ESOKIT_REFERENCE_REJECTED);
   }
 #endif
   if (runs) {
-    u = wanted(o, r);
+    u = wanted(o, DESIGN_R_GIVEN);
   }
   if (!is_finite(u)) {
     o->status = (uint16_t)(o->status | ESOKIT_REFERENCE_REJECTED);
@@ -280,7 +284,7 @@ static void skip_sample(esokit_state *o, real given)
   o->status = (uint16_t)observe_predict(o, given);
 }
 
-real esokit_update(esokit_state *o, real y, real r)
+real esokit_update(esokit_state *o, real y, DESIGN_R)
 {
 #if ESOKIT_ERROR_BASED
   const real measured = r - y;
@@ -290,18 +294,18 @@ real esokit_update(esokit_state *o, real y, real r)
 #if ESOKIT_DIVIDED
   if (o->phase != 0u) {
     skip_sample(o, o->u_last);
-    return put_out(o, r);
+    return put_out(o, DESIGN_R_GIVEN);
   }
   o->phase = 1u;
 #endif
   take_sample(o, measured, o->u_last);
-  return put_out(o, r);
+  return put_out(o, DESIGN_R_GIVEN);
 }
 
-real esokit_update_without_measurement(esokit_state *o, real r)
+real esokit_update_without_measurement(esokit_state *o, DESIGN_R)
 {
   skip_sample(o, o->u_last);
-  return put_out(o, r);
+  return put_out(o, DESIGN_R_GIVEN);
 }
 
 unsigned esokit_applied(esokit_state *o, real u)
@@ -445,7 +449,7 @@ real esokit_estimate(const esokit_state *o, unsigned row)
 #ifdef ESOKIT_SELF_TEST
 int esokit_self_test(real tolerance)
 {
-  static const real samples[SAMPLES][3] = { /* DESIGN_COLUMNS */
+  static const real samples[SAMPLES][COLUMNS] = { /* DESIGN_COLUMNS */
     DESIGN_VECTORS
   };
   esokit_state o;
@@ -453,13 +457,13 @@ int esokit_self_test(real tolerance)
   esokit_init(&o);
   for (i = 0; i < SAMPLES; ++i) {
 #if ESOKIT_CONTROLLER || ESOKIT_PREDICTIVE
-    const real result = esokit_update(&o, samples[i][0], samples[i][1]);
+    const real result = esokit_update(&o, samples[i][0], DESIGN_SAMPLE_R);
 #else
     real result;
     (void)esokit_update(&o, samples[i][0], samples[i][1]);
     result = esokit_estimate(&o, ORDER);
 #endif
-    if (!(fabs(result - samples[i][2]) <= tolerance)) {
+    if (!(fabs(result - samples[i][COLUMNS - 1u]) <= tolerance)) {
       return i + 1;
     }
   }

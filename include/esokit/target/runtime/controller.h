@@ -172,9 +172,9 @@ void esokit_init(esokit_state *o);
 unsigned esokit_start(esokit_state *o, real y, real u);
 /* One sample: y (NaN if it is missing) and r, DESIGN_REFERENCE; returns the u to be held
  * until the next. */
-real esokit_update(esokit_state *o, real y, real r);
+real esokit_update(esokit_state *o, real y, DESIGN_R);
 /* The same without a measurement. */
-real esokit_update_without_measurement(esokit_state *o, real r);
+real esokit_update_without_measurement(esokit_state *o, DESIGN_R);
 /* What the actuator really held, before the next update; only if it differs from what update gave.
  * The observer gets it; a limit of rate counts from what update gave (after start: from this u).
  * Returns a status. */
@@ -188,10 +188,10 @@ unsigned esokit_reset(esokit_state *o, real y);
 real esokit_control(esokit_state *o, real y);
 /* The same without a measurement. */
 real esokit_control_without_measurement(esokit_state *o);
-/* The rest, any time before the next sample, whose reference is given. Returns a status. */
-unsigned esokit_prepare(esokit_state *o, real next_r);
+/* The rest, any time before the next sample, whose DESIGN_REFERENCE is given. Returns a status. */
+unsigned esokit_prepare(esokit_state *o, DESIGN_NEXT_R);
 /* Both at once. */
-real esokit_update(esokit_state *o, real y, real next_r);
+real esokit_update(esokit_state *o, real y, DESIGN_NEXT_R);
 /* What the actuator really holds; only if it is not what control gave. A limit of rate counts from
  * what control gave (after start: from this u). Returns a status. */
 unsigned esokit_applied(esokit_state *o, real u);

@@ -73,9 +73,9 @@ static real estimate_at(const esokit_state *o, unsigned row)
 }
 
 #if ESOKIT_CONTROLLER && ESOKIT_SCHEDULE
-static bool law(const esokit_state *o, real r, real *u)
+static bool law(const esokit_state *o, DESIGN_R, real *u)
 {
-  return law_for(o, r, DESIGN_ALL_ESTIMATES, u);
+  return law_for(o, DESIGN_R_GIVEN, DESIGN_ALL_ESTIMATES, u);
 }
 
 #endif

@@ -99,7 +99,7 @@ unsigned esokit_start(esokit_state *o, real y, real u)
   (void)take_output(o, u);
   (void)track(o);
   o->phase = 5u;
-  (void)refer(o, y);
+  (void)refer(o, DESIGN_R_AT_REST);
   arm(o);
   return 0u;
 }
@@ -146,7 +146,7 @@ real esokit_control_without_measurement(esokit_state *o)
   return u;
 }
 
-static unsigned prepare_next(esokit_state *o, real next_r)
+static unsigned prepare_next(esokit_state *o, DESIGN_NEXT_R)
 {
   unsigned status = 0u;
   real given = o->u_last;
@@ -171,7 +171,7 @@ static unsigned prepare_next(esokit_state *o, real next_r)
   }
   o->phase = 0u;
   o->status = (uint16_t)status;
-  (void)refer(o, next_r);
+  (void)refer(o, DESIGN_NEXT_R_GIVEN);
   arm(o);
   return o->status;
 }
@@ -181,15 +181,15 @@ real esokit_control(esokit_state *o, real y)
   return control_now(o, y);
 }
 
-unsigned esokit_prepare(esokit_state *o, real next_r)
+unsigned esokit_prepare(esokit_state *o, DESIGN_NEXT_R)
 {
-  return prepare_next(o, next_r);
+  return prepare_next(o, DESIGN_NEXT_R_GIVEN);
 }
 
-real esokit_update(esokit_state *o, real y, real next_r)
+real esokit_update(esokit_state *o, real y, DESIGN_NEXT_R)
 {
   const real u = control_now(o, y);
-  (void)prepare_next(o, next_r);
+  (void)prepare_next(o, DESIGN_NEXT_R_GIVEN);
   return u;
 }
 
