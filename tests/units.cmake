@@ -10,7 +10,7 @@ set(esokit_units
     "analysis/covariance analysis/frequency_response analysis/loop analysis/measured_response"
     "analysis/dense analysis/error_bound analysis/integrator_chain"
     "control/absurd_numbers control/adrc control/controller_static control/missing_samples control/nonlinear_feedback control/pack control/softening"
-    "control/adrc_law control/health control/pairs_law control/reconvergence control/tracking_differentiator"
+    "control/adrc_law control/health control/pairs_law control/reconvergence control/time_proportioned control/tracking_differentiator"
     "control/explicit_instantiation_static control/packed control/retune control/settings_law control/smooth_profile"
     "control/disturbance_compensator control/experiment control/mimo_adrc control/predictive_adrc"
     "control/linear_controller_laws control/varying_gain_controller_laws"
@@ -29,5 +29,5 @@ set(esokit_units
     "observer/algebraic_eso_laws observer/extended_state_filter_laws observer/model_eso_laws observer/model_parts_laws observer/nonlinear_eso_laws"
     "sim/closed_loop sim/dormand_prince sim/metrics sim/noise sim/plant sim/refused_config sim/runge_kutta sim/signals"
     "sim/counted_gaussian sim/run sim/study_records"
-    "target/health_code target/profile_code"
+    "target/health_code target/profile_code target/time_proportioned_code"
     "tune/pid_conversion tune/tune tune/update_operations")

@@ -56,6 +56,7 @@
 #include <esokit/control/smooth_profile.hpp>
 #include <esokit/control/softening.hpp>
 #include <esokit/control/telemetry.hpp>
+#include <esokit/control/time_proportioned.hpp>
 #include <esokit/control/tracking_differentiator.hpp>
 #include <esokit/core/check.hpp>
 #include <esokit/core/compiled.hpp>
@@ -216,6 +217,7 @@
 #include <esokit/target/runtime_text.hpp>
 #include <esokit/target/st_translator.hpp>
 #include <esokit/target/structured_text.hpp>
+#include <esokit/target/time_proportioned_code.hpp>
 #include <esokit/target/writable.hpp>
 #include <esokit/target/written_names.hpp>
 #include <esokit/tune/controller.hpp>

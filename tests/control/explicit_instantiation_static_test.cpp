@@ -17,6 +17,7 @@
 #include <esokit/control/nonlinear_feedback.hpp>
 #include <esokit/control/predictive_adrc.hpp>
 #include <esokit/control/smooth_profile.hpp>
+#include <esokit/control/time_proportioned.hpp>
 #include <esokit/control/tracking_differentiator.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
@@ -70,6 +71,7 @@ template class NonlinearFeedback<1>;
 template class TrackingDifferentiator<double>;
 template class ApproachProfile<2, 3>;
 template class SmoothProfile<1>;
+template class TimeProportioned<double>;
 template class Limiter<double>;
 template class Fal<double>;
 template class ControlLoop<LinearEso<1>>;

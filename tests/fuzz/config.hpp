@@ -410,6 +410,13 @@ class Filler {
       if (order_ == 2) number("dead_time", config.dead_time, {0, 3 * T});
       number("bandwidth", config.bandwidth, {0.01 / T, 1 / T, true});
     }
+    if constexpr (requires { config.least_on; }) {
+      number("off", config.off, {-10, 10});
+      number("on", config.on, {-10, 10});
+      config.window = static_cast<decltype(config.window)>(T * tape_.integer(1, 60, "window"));
+      number("least_on", config.least_on, {0, 4 * T});
+      number("least_off", config.least_off, {0, 4 * T});
+    }
     if constexpr (requires { config.hand_over; }) {
       const bool relay = tape_.choice(2, "excitation") == 0;
       if (!relay) config.excitation = static_cast<decltype(config.excitation)>(1);

@@ -988,8 +988,22 @@ class Driver final : public Game {
       });
     }
     if constexpr (requires(T & o, S s) {
-                    { o.update(s) } -> std::same_as<bool>;
+                    o.begins();
+                    o.applied();
                   }) {
+      add(a, "update", [](Driver& d) {
+        const S u = d.number();
+        const bool begins = d.object_->begins();
+        const bool is_on = d.quietly([&] { return d.object_->update(u); });
+        if (begins && !is_finite(u) && is_on) d.fail("on by a bad u");
+        const S low = std::min(d.config_.off, d.config_.on);
+        const S high = std::max(d.config_.off, d.config_.on);
+        if (!(low <= d.object_->applied() && d.object_->applied() <= high))
+          d.fail("more than on, or less than off");
+      });
+    } else if constexpr (requires(T & o, S s) {
+                           { o.update(s) } -> std::same_as<bool>;
+                         }) {
       for (int weight = 0; weight < 4; ++weight) {
         add(a, "update", [](Driver& d) {
           const S r = d.number();

@@ -6,6 +6,7 @@
 #include <esokit/control/experiment.hpp>
 #include <esokit/control/nonlinear_feedback.hpp>
 #include <esokit/control/smooth_profile.hpp>
+#include <esokit/control/time_proportioned.hpp>
 #include <esokit/control/tracking_differentiator.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/mimo_extended_state_filter.hpp>
@@ -26,6 +27,7 @@ void add_filters(std::vector<Kind>& kinds) {
   KIND(NonlinearFeedback<2, float>);
   KIND(SmoothProfile<2, float>);
   KIND(ApproachProfile<2, 3, float>);
+  KIND(TimeProportioned<float>);
 #ifndef ESOKIT_ONE_TYPE
   KIND(ExtendedStateFilter<2, double>);
   KIND(WrappedOutput<ExtendedStateFilter<2, float>>);

@@ -21,6 +21,7 @@
 #include <esokit/target/health_code.hpp>
 #include <esokit/target/profile_code.hpp>
 #include <esokit/target/structured_text.hpp>
+#include <esokit/target/time_proportioned_code.hpp>
 #include <limits>
 #include <target/written.hpp>
 
@@ -488,6 +489,36 @@ TEST(StructuredText, OfProfiles) {
   moves_in_text<1, float>(701);
   moves_in_text<2, double>(711);
   moves_in_text<3, double>(721);
+}
+
+template <class V>
+void switches_in_text(double on, std::uint64_t seed) {
+  auto output = TimeProportioned<V>::make({.off = V(1),
+                                           .on = static_cast<V>(on),
+                                           .window = V(0.5),
+                                           .least_on = V(0.06),
+                                           .least_off = V(0.1),
+                                           .sample_time = V(0.02)})
+                    .value();
+  const auto block = to_structured_text(output, {.name = "relay"}).value();
+  Samples samples("u : is_on applied begins");
+  Random random(seed + asked("ESOKIT_WRITTEN_SEED", 0));
+  int ons = 0;
+  for (int k = 0; k < 4 * samples_each; ++k) {
+    const V u = odd(random, static_cast<V>(1 + (on - 1) * random.uniform(-0.2, 1.2)));
+    const bool is_on = output.update(u);
+    samples.number(u).count(is_on).number(output.applied()).count(output.begins()).word("\n");
+    ons += is_on;
+  }
+  EXPECT_GT(ons, samples_each);
+  EXPECT_LT(ons, 3 * samples_each);
+  interprets(block, samples);
+}
+
+TEST(StructuredText, OfTimeProportioned) {
+  if (!there("python3")) GTEST_SKIP() << "no python3";
+  switches_in_text<float>(100, 721);
+  switches_in_text<double>(-3, 731);
 }
 
 /// A monitor fed by the outputs of its controller's block, which equal what it looks at.

@@ -16,6 +16,7 @@
 #include <esokit/target/health_code.hpp>
 #include <esokit/target/profile_code.hpp>
 #include <esokit/target/structured_text.hpp>
+#include <esokit/target/time_proportioned_code.hpp>
 #include <regex>
 #include <set>
 #include <sstream>
@@ -182,6 +183,10 @@ TEST(WrittenNames, NoVariableIsAWordOfStructuredText) {
       to_structured_text(SmoothProfile<3>::make({.limits = {1, 1, 1}, .sample_time = 1e-2}).value(),
                          named("motor"))
           .value());
+  texts.push_back(to_structured_text(
+                      TimeProportioned<>::make({.on = 1, .window = 1, .sample_time = 1e-2}).value(),
+                      named("motor"))
+                      .value());
   for (const std::string& text : texts) {
     for (const std::string& word : detail::identifiers_in(text)) {
       const bool capitals = in_small(word) != word;

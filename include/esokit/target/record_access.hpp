@@ -651,6 +651,16 @@ struct RecordAccess {
     return numbers;
   }
 
+  /// The settings of a TimeProportioned.
+  template <class P>
+  static auto proportioned(const P& p) noexcept {
+    struct {
+      typename P::scalar_type off, on, sample_time;
+      std::int32_t window, shortest, longest;
+    } const numbers{p.off_, p.on_, p.sample_time_, p.window_, p.shortest_, p.longest_};
+    return numbers;
+  }
+
   /// The curve of a MappedInput. Without a point, it gets one in the middle of its line.
   template <class O>
   static MapNumbers map(const O& o) {

@@ -1,0 +1,101 @@
+/// @file
+/// to_c of a TimeProportioned: a relay's output as C99.
+#pragma once
+
+#include <cstddef>
+#include <esokit/control/time_proportioned.hpp>
+#include <esokit/core/expected.hpp>
+#include <esokit/target/c_code.hpp>
+#include <esokit/target/list_writer.hpp>
+#include <esokit/target/record_access.hpp>
+#include <esokit/target/recorded_design.hpp>
+#include <esokit/target/runtime_text.hpp>
+#include <esokit/target/structured_text.hpp>
+#include <string>
+
+namespace esokit {
+
+namespace detail {
+
+namespace runtime {
+inline constexpr const char* proportioned_header =
+#include <esokit/target/runtime/proportioned.h>
+    ;
+inline constexpr const char* proportioned =
+#include <esokit/target/runtime/proportioned.c>
+    ;
+}  // namespace runtime
+
+}  // namespace detail
+
+/// A time-proportioned output as C99: `name_reset`, then `name_update` once a sample; `name_begins`
+/// and `name_applied` as those of the C++, which it equals bit for bit.
+/// @param output as `make` returned it @return error for the options, as for a controller
+template <PlainScalar S>
+Expected<CCode, Error<S>> to_c(const TimeProportioned<S>& output, const CodeOptions& options = {}) {
+  if (const auto rules = detail::checked_options<S>(options); !rules) return rules.error();
+  const auto new_names = detail::new_names<S>(
+      options, [&](const CodeOptions& as) { return detail::text_of(to_c(output, as)); });
+  if (!new_names) return new_names.error();
+  constexpr bool single = sizeof(S) == sizeof(float);
+  const auto number = [](S x) {
+    return detail::ListWriter(detail::c_language, single).number(static_cast<double>(x));
+  };
+  const auto numbers = detail::RecordAccess::proportioned(output);
+  const S range = numbers.on - numbers.off;
+  TimeProportioned<S> simulated = output;
+  std::string vectors;
+  S u = numbers.off;
+  for (int k = 0; k < options.self_test_samples; ++k) {
+    if (simulated.begins()) u = numbers.off + range * (S(k % 13) / S(10) - S(1) / S(10));
+    const bool is_on = simulated.update(u);
+    vectors += "    {" + number(u) + ", " + number(S(is_on ? 1 : 0)) + ", " +
+               number(simulated.applied()) + "},\n";
+  }
+  detail::RuntimeText text(options.name, single);
+  text.count("SAMPLES", static_cast<std::size_t>(options.self_test_samples));
+  text.constant("WINDOW", std::to_string(numbers.window));
+  text.constant("SHORTEST", std::to_string(numbers.shortest));
+  text.constant("LONGEST", std::to_string(numbers.longest));
+  text.constant("BEYOND_LONGEST", std::to_string(numbers.longest + numbers.window));
+  text.constant("OFF_VALUE", number(numbers.off));
+  text.constant("ON_VALUE", number(numbers.on));
+  text.constant("RANGE", number(range));
+  text.constant("LOW", number(range < S(0) ? numbers.on : numbers.off));
+  text.constant("HIGH", number(range < S(0) ? numbers.off : numbers.on));
+  text.constant("SAMPLE_TIME", number(numbers.sample_time));
+  text.lines("DESIGN_ABOUT", options.comment.empty() ? "" : " * " + options.comment + "\n");
+  text.lines("DESIGN_VECTORS", vectors);
+  return CCode{text.header(detail::runtime::proportioned_header),
+               text.source({detail::runtime::head, detail::runtime::proportioned}),
+               {}};
+}
+
+/// The same as a function block in Structured Text, a call of which is a sample: its C, translated.
+/// @param output as for to_c @return the text, or an error as for to_c
+template <PlainScalar S>
+Expected<std::string, Error<S>> to_structured_text(const TimeProportioned<S>& output,
+                                                   const CodeOptions& options = {}) {
+  const auto code = to_c(output, options);
+  if (!code) return code.error();
+  const auto new_names = detail::new_names_in_block<S>(
+      options, [&](const CodeOptions& as) { return to_structured_text(output, as); });
+  if (!new_names) return new_names.error();
+  detail::StBlock block(*code, options, sizeof(S) == sizeof(float), "_reset");
+  block.input("u : $real", "counts at the start of a window");
+  block.output("is_on : BOOL");
+  block.output("applied : $real", "the mean of this window");
+  block.output("begins : BOOL", "TRUE: the next call begins a window");
+  block.body =
+      "is_on := $name_update(o := o, u := u);\napplied := $name_applied(o := o);\n"
+      "begins := $name_begins(o := o);\n";
+  const detail::StructuredText all = block.text(
+      "(* Written by esokit from a finished output; do not edit.\n$COMMENT   FUNCTION_BLOCK $name "
+      "is at the end: call it once in each T = " +
+      detail::ListWriter(detail::c_language, false)
+          .number(static_cast<double>(detail::RecordAccess::proportioned(output).sample_time)) +
+      " s. *)\n\n");
+  return all.template expected<S>(all.text);
+}
+
+}  // namespace esokit
