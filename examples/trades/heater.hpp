@@ -46,6 +46,9 @@ class Heater {
     return power;
   }
 
+  /// The power that really went out since `step`, where it is not what that returned.
+  void applied(double power) { (void)loop_.applied(power); }
+
   /// Once a sample while someone else sets the power, and before the first `step`: from there the
   /// loop takes over without a jump.
   void manual(double temperature, double power) {

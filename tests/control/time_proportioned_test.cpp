@@ -67,7 +67,7 @@ void keeps_its_times(std::uint64_t seed) {
       const double share = random.index(4) == 0 ? random.index(2) : random.uniform(-0.3, 1.3);
       // As its scalar has it.
       const S u = static_cast<S>(off + share * (on - off));
-      const double from = static_cast<S>(off);
+      const auto from = static_cast<double>(static_cast<S>(off));
       asked += window * std::clamp((static_cast<double>(u) - from) /
                                        (static_cast<double>(static_cast<S>(on)) - from),
                                    0.0, 1.0);
