@@ -418,7 +418,7 @@ TEST(AugmentedModel, EveryGapThatIsBridgedLetsErrorsDecay) {
                .model = {.actuator = {0.01}, .sensor = {0.005}, .resonators = {{{w}}}}})
               .value();
       EXPECT_GE(observer.max_gap(), 4) << bandwidth << ", " << w;
-      for (int missing = 1; missing <= observer.max_gap(); missing += esokit_test::stride) {
+      for (const int missing : esokit_test::lengths(1, observer.max_gap())) {
         const auto pattern = [&](int k) { return k % (missing + 1) != 0; };
         EXPECT_LT(error_after(observer, pattern, 200000), 1e-3)
             << bandwidth << " rad/s, w " << w << ", " << missing << " missing";

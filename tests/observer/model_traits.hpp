@@ -121,7 +121,7 @@ inline void recurring_gaps_decay(const ObserverKind& kind) {
       return most;
     };
     const int corrections = 100 * laws.settling_samples(omega_t);
-    for (int every = 2; every <= max_gap + 1; every += stride) {
+    for (const int every : lengths(2, max_gap + 1)) {
       SCOPED_TRACE(every);
       const Real apart = laws.period * every;
       ASSERT_EQ(observer->reset(laws.state([](int) { return 1; }, apart)), StepStatus::ok);

@@ -2,6 +2,7 @@
 /// Small numeric helpers of the tests: seeded data, exact comparison, hidden bad values.
 #pragma once
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstddef>
@@ -9,6 +10,7 @@
 #include <cstring>
 #include <limits>
 #include <type_traits>
+#include <vector>
 
 namespace esokit_test {
 
@@ -34,6 +36,15 @@ constexpr bool too_long(int samples) { return sanitized && samples > 50'000; }
 
 /// The step through many cases that take the same way: every fifth under the sanitizers.
 inline constexpr int stride = sanitized ? 5 : 1;
+
+/// The lengths of gaps from `first` on that are tried where hundreds are bridged: each of the short
+/// ones, of the longer ones those an eighth apart, and the longest.
+inline std::vector<int> lengths(int first, int longest) {
+  std::vector<int> all;
+  for (int n = first; n < longest; n += std::max(stride, n / 8)) all.push_back(n);
+  if (first <= longest) all.push_back(longest);
+  return all;
+}
 
 /// splitmix64: the same numbers on every platform and standard library.
 class Random {
