@@ -18,6 +18,7 @@
 #include <vector>
 
 #include <support/augmented_reference.hpp>
+#include <support/numbers.hpp>
 #include <support/refusal.hpp>
 #include <support/resonator_model.hpp>
 #include <support/switching.hpp>
@@ -421,7 +422,7 @@ TEST(ModelGain, EveryRecurringGapThatIsBridgedLetsErrorsDecay) {
               {.observer_bandwidth = bandwidth, .input_gain = 1.0, .sample_time = kT, .model = {w}})
               .value();
       EXPECT_GE(observer.max_gap(), 3) << bandwidth << ", " << w;
-      for (const int missing : lengths(1, observer.max_gap())) {
+      for (const int missing : esokit_test::lengths(1, observer.max_gap())) {
         const auto pattern = [&](int k) { return k % (missing + 1) != 0; };
         EXPECT_LT(error_after(observer, pattern, 400000), 1e-3)
             << bandwidth << " rad/s, w " << w << ", " << missing << " missing";
