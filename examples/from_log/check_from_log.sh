@@ -85,7 +85,8 @@ code_of() {
 }
 
 # The machine of this script under the code that is pasted: steps, a load of half of what u can
-# balance, a sensor that is lost for some samples and has single outliers.
+# balance, a sensor that is lost for some samples and has single outliers; less u than DEAD does
+# nothing.
 cat >play.cpp <<'END'
 #define main pasted_main
 #include "pasted.cpp"
@@ -97,7 +98,7 @@ int main() {
   std::mt19937_64 bits(1);
   std::normal_distribution<double> normal;
   double x = 0, v = 0, old1 = -0.1, old2 = -0.1, error = 0, moving = 0, rest = 0;
-  loop->start(0, -0.1);
+  loop->start(0, -0.1 - DEAD);
   for (int k = 0; k < 9000; ++k) {
     const double target = k < 200 ? 0 : k < 4000 ? 1 : -0.5;
     double y = x + 1e-3 * normal(bits);
@@ -115,7 +116,7 @@ int main() {
       v += a * 5e-4;
     }
     old2 = old1;
-    old1 = u;
+    old1 = std::copysign(std::max(std::abs(u) - DEAD, 0.0), u);
   }
   const auto fault = esokit::diagnose(loop->monitor.health());
   std::printf("moving %g, at rest %g, after the load %g, fault %d, rejected %u\n", moving, rest,
@@ -146,7 +147,7 @@ compiles() {  # compiles PAGE: all its programs, in one, say that they check; th
   "$compiler" "${flags[@]}" wrong.cpp -o wrong 2>errors || return 1
   ./wrong >said_wrong && return 1
   grep -q '^self-check: sample' said_wrong || return 1
-  "$compiler" "${flags[@]}" -O1 play.cpp -o play 2>errors && ./play >said_play
+  "$compiler" "${flags[@]}" -O1 -DDEAD=0.0 play.cpp -o play 2>errors && ./play >said_play
 }
 
 # ---- a servo under a PD controller ----
@@ -155,11 +156,11 @@ compiles() {  # compiles PAGE: all its programs, in one, say that they check; th
 #   b input gain; scale of u; quantum of y; still=1: the reference does not move; noise of y; drift
 #   of the load a row; friction; hold: friction that holds at standstill; push: of a measured w, the
 #   last column, behind 10 ms of lag and 6 ms of dead time; every: rows in which u holds; relay: u is
-#   1 or -1
+#   1 or -1; dead: less u does nothing; most: more does no more; square=1: u acts as its square over 6
 servo() {
   local set=() pair
   for pair in "$@"; do set+=(-v "$pair"); done
-  awk -v b=50 -v scale=1 -v quantum=0 -v still=0 -v rows=4000 -v noise=1e-3 -v wander=0.02 -v friction=0 -v hold=0 -v push=0 -v every=1 -v relay=0 "${set[@]}" '
+  awk -v b=50 -v scale=1 -v quantum=0 -v still=0 -v rows=4000 -v noise=1e-3 -v wander=0.02 -v friction=0 -v hold=0 -v push=0 -v every=1 -v relay=0 -v dead=0 -v most=0 -v square=0 "${set[@]}" '
     function normal() {
       seed = (seed * 69069 + 12345) % 4294967296; first = (seed + 1) / 4294967297
       seed = (seed * 69069 + 12345) % 4294967296
@@ -191,7 +192,11 @@ servo() {
           }
           x += v * T / 4 + a * T * T / 32; v += a * T / 4
         }
-        old2 = old1; old1 = u; old_w3 = old_w2; old_w2 = old_w1; old_w1 = w
+        effect = u
+        if (dead) effect = u > dead ? u - dead : u < -dead ? u + dead : 0
+        if (most) effect = u > most ? most : u < -most ? -most : u
+        if (square) effect = u * (u > 0 ? u : -u) / 6
+        old2 = old1; old1 = effect; old_w3 = old_w2; old_w2 = old_w1; old_w1 = w
       }
     }'
 }
@@ -219,7 +224,9 @@ healthy plain.csv
 [[ $(grep -c '<h2>Paste this' "$page") == 1 ]]
 verdict $? "plain.csv: no controller on $page"
 first=$page
-compiles "$first" &
+(
+  mkdir -p pasted && cp play.cpp pasted && cd pasted && compiles "../$first"
+) &
 pasted=$!
 before=$(cksum <"$first")
 healthy plain.csv --limits -6,6 --b0 60 --settling 0.5
@@ -236,6 +243,33 @@ grep -q 'force += .* \* std::tanh(rate / ' rubbing.cpp &&
   "$compiler" -std=c++20 -I"$root/include" -Wall -Wextra -Wconversion -Werror rubbing.cpp -o rubbing &&
   [[ $(./rubbing) == 'self-check: ok' ]]
 verdict $? "rubbing.csv: no friction in the code, or its self-check fails: $(cat rubbing.cpp)"
+# An actuator with a dead zone, or one that saturates: named, b0 is that of the effect, and what is
+# pasted puts out u. Its controller and the last PID, on the machine with the dead zone.
+servo most=1.5 >rows.txt
+written t,y,u , t >saturates.csv
+healthy saturates.csv --no-design
+[[ $said == 'The actuator saturates: u (u) beyond ± 1.5 '* ]]
+verdict $? "saturates.csv: no saturation is named: $said"
+run saturates.csv --no-design --literal curve
+[[ $alarms == 'large-u ' && $said != *saturates:* ]]
+verdict $? "saturates.csv --literal curve: no alarm: $said"
+servo dead=1 >rows.txt
+written t,y,u , t >dead.csv
+healthy dead.csv --limits 6
+[[ $said == 'The actuator has a dead zone: u (u) does nothing between -1 and 1 '* ]]
+verdict $? "dead.csv: no dead zone is named: $said"
+runs_with_its_map() {  # runs_with_its_map PAGE: its first and last program
+  code_of "$1" | awk '/^\/\/ program$/ { ++n } n == 1' >pasted.cpp
+  code_of "$1" | awk '/^\/\/ program$/ { text = "" } { text = text $0 "\n" } END { print text }' >pid.cpp
+  "$compiler" -std=c++20 -I"$root/include" -Wall -Wextra -Wconversion -Werror pid.cpp -o pid &&
+    grep -q 'actuator.input(' pid.cpp && [[ $(./pid) == 'self-check: ok' ]] &&
+    "$compiler" -std=c++20 -I"$root/include" -Wall -Wextra -Wconversion -Werror -O2 -ffast-math pasted.cpp -o dead &&
+    [[ $(./dead) == 'self-check: ok' ]] || return 1
+  "$compiler" -std=c++20 -I"$root/include" -Wall -Wextra -Wconversion -Werror -O1 -DDEAD=1.0 play.cpp -o play_dead &&
+    ./play_dead >said_dead
+}
+runs_with_its_map "$page"
+verdict $? "dead.csv: its code does not compile, check or hold the machine: $(cat said_dead pasted.cpp pid.cpp)"
 # A load that is measured, a fifth of a unit each: what is pasted measures it, too, and holds one that
 # is lost.
 servo push=40 >rows.txt
@@ -467,7 +501,7 @@ written t,y,u , 'NR / 30000' >sixty_hertz.csv
 refuses 'in which unit is the time?' sixty_hertz.csv
 { echo t,y,u; awk '{ print $1 "," $2 "," $3 (NR > 9 ? " A" : "") }' rows.txt; } >two_units.csv
 refuses "has the unit A, the numbers before have none" two_units.csv
-refuses "--literal: 'late' is none of" plain.csv --literal late
+refuses "--literal: 'late' is none of changes, curve, late-u" plain.csv --literal late
 
 # Real machines: most are refused, but nothing is wrong with their units, signs and clocks.
 data=$root/examples/data
@@ -782,7 +816,7 @@ if [[ -s $objects/libesokit_from_log.a ]]; then
 fi
 
 wait "$pasted"
-verdict $? "what $first says does not compile, check or hold the machine: $(head -n 5 errors;
+verdict $? "what $first says does not compile, check or hold the machine: $(cd pasted && head -n 5 errors;
   cat said_all said_wrong said_play; cat pasted.cpp)"
 
 echo "$passed passed, $failed failed"

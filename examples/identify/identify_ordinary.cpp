@@ -8,8 +8,8 @@
 // y       with noise, in steps of an encoder, speed from counts, filtered, late, with an offset,
 //         with spikes
 // u       steps, few steps, PRBS, sines, ramps; PI controller (n = 1) or PD (n = 2) on steps
-// Not ordinary: commands beyond a saturating actuator, a square valve, y before u, y that has
-// nothing to do with u, a reference that never moves, y an acceleration
+// Not ordinary: commands beyond a saturating actuator, a square valve, a dead zone, y before u, y
+// that has nothing to do with u, a reference that never moves, y an acceleration
 //
 // --count N: so many logs of each kind; --seed S: from this seed on. Every run has time for a few.
 
@@ -39,6 +39,8 @@ struct Outcome {
   bool covered = false;
   bool wrong = false;   // of the other sign, or off by a factor of two
   bool warned = false;  // that b0 differs with u or at standstill, or that y is early
+  esokit::CurveKind curve = esokit::CurveKind::straight;
+  double size_error = 0;  // of the curve, share of the true one
 };
 
 Outcome identified(std::uint64_t seed, Habit habit) {
@@ -52,6 +54,8 @@ Outcome identified(std::uint64_t seed, Habit habit) {
   const auto found = compiled::study(log, options);
   if (!found) return {.refusal = found.error().field};
   Outcome outcome;
+  outcome.curve = found->curve.kind;
+  outcome.size_error = std::abs(found->curve.size.value / made.curve_size - 1);
   if (const auto verdict = esokit::judge(*found, log, options); !verdict)
     outcome.refusal = verdict.error().field;
   const esokit::Estimate& b0 = found->input_gain;
@@ -86,16 +90,20 @@ int main(int argc, char** argv) {
     std::size_t few;
     double asked;  // share accepted; 0: nothing is asked
     bool machine;  // which b0 describes
+    esokit::CurveKind curve = esokit::CurveKind::straight;
   };
-  constexpr Kind kinds[] = {{"order 1, open loop", Habit::open, 8, 0.85, true},
-                            {"order 1, PI controller", Habit::pi, 8, 0.6, true},
-                            {"order 2, servo", Habit::servo, 6, 0.6, true},
-                            {"saturating actuator", Habit::saturating, 2, 0, true},
-                            {"square valve", Habit::square, 2, 0, true},
-                            {"y before u", Habit::early, 2, 0, false},
-                            {"y unrelated to u", Habit::unrelated, 2, 0, false},
-                            {"reference never moves", Habit::regulator, 2, 0, false},
-                            {"y an acceleration", Habit::acceleration, 2, 0, false}};
+  constexpr Kind kinds[] = {
+      {"order 1, open loop", Habit::open, 8, 0.85, true},
+      {"order 1, PI controller", Habit::pi, 8, 0.6, true},
+      {"order 2, servo", Habit::servo, 6, 0.6, true},
+      {"saturating actuator", Habit::saturating, 2, 0, true, esokit::CurveKind::saturation},
+      {"square valve", Habit::square, 2, 0, true, esokit::CurveKind::square},
+      {"dead zone", Habit::dead_zone, 2, 0, true, esokit::CurveKind::dead_zone},
+      {"servo with a dead zone", Habit::dead_servo, 2, 0, true, esokit::CurveKind::dead_zone},
+      {"y before u", Habit::early, 2, 0, false},
+      {"y unrelated to u", Habit::unrelated, 2, 0, false},
+      {"reference never moves", Habit::regulator, 2, 0, false},
+      {"y an acceleration", Habit::acceleration, 2, 0, false}};
   std::vector<CsvRow> lines;
   for (const Kind& kind : kinds) {
     const std::size_t logs = count > 0 ? count : kind.few;
@@ -103,8 +111,13 @@ int main(int argc, char** argv) {
         kind.name, logs, [&](std::size_t i) { return identified(seed + i, kind.habit); });
     std::vector<double> errors;
     std::map<std::string, int> reasons;
-    double accepted = 0, covered = 0, wrong = 0, warned = 0;
+    double accepted = 0, covered = 0, wrong = 0, warned = 0, named = 0, other = 0, near = 0;
     for (const Outcome& o : outcomes) {
+      if (o.curve != esokit::CurveKind::straight) {
+        named += 1;
+        other += o.curve != kind.curve ? 1 : 0;
+        near += o.size_error < 0.1 ? 1 : 0;
+      }
       if (!o.refusal.empty()) {
         ++reasons[o.refusal];
         continue;
@@ -124,7 +137,8 @@ int main(int argc, char** argv) {
                      accepted > 0 && kind.machine ? percent(covered / accepted) : "",
                      errors.empty() || !kind.machine ? "" : percent(errors[errors.size() / 2]),
                      kind.machine ? number_text(wrong, 4) : "",
-                     accepted > 0 ? percent(warned / accepted) : "", why});
+                     accepted > 0 ? percent(warned / accepted) : "", number_text(named, 4),
+                     number_text(other, 4), number_text(near, 4), why});
     if (kind.asked > 0) {
       // With few logs a share is only known to two standard errors.
       const double slack = count > 0 ? 0.0 : 2 * std::sqrt(kind.asked * (1 - kind.asked) / all);
@@ -139,7 +153,8 @@ int main(int argc, char** argv) {
   report.table(
       "ordinary", "All logs, and why some were refused",
       {"logs", "count", "accepted (%)", "b0 in its 95 % interval (%)", "b0: median error (%)",
-       "wrong by sign or a factor of two", "of the accepted, warned of (%)", "refused for"},
+       "wrong by sign or a factor of two", "of the accepted, warned of (%)", "a curve is named",
+       "of another kind", "its size within 10 %", "refused for"},
       lines);
   return report.finish();
 }

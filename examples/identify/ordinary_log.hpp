@@ -25,6 +25,8 @@ enum class Habit {
   servo,
   saturating,   // commands beyond the limits of the actuator are logged
   square,       // the effect of a valve is the square of u
+  dead_zone,    // small u do nothing
+  dead_servo,   // the same of a servo
   early,        // y comes before u
   unrelated,    // y has nothing to do with u
   regulator,    // a controller whose reference never moves
@@ -34,6 +36,8 @@ enum class Habit {
 /// u, y and what made them. For a nonlinear actuator b0 lies between `least` and `most`.
 struct OrdinaryLog : RandomLog {
   double least = 0, most = 0;
+  double curve_size =
+      0;                 ///< width of the dead zone, limit of the saturation, u where a square is u
   std::string features;  ///< in words, to find out what is difficult
 };
 
@@ -92,7 +96,7 @@ inline OrdinaryLog ordinary_log(std::uint64_t seed, Habit habit) {
   esokit::sim::Gaussian gaussian(seed ^ 0x9e3779b97f4a7c15u);
   OrdinaryLog log;
   Truth& p = log.truth;
-  const bool servo = habit == Habit::servo;
+  const bool servo = habit == Habit::servo || habit == Habit::dead_servo;
   const bool loop = habit == Habit::pi || habit == Habit::regulator;
   p.order = servo ? 2 : 1;
   const auto rows = static_cast<std::size_t>(random.log_uniform(300, 10000));
@@ -125,8 +129,11 @@ inline OrdinaryLog ordinary_log(std::uint64_t seed, Habit habit) {
   const double encoder = servo ? size / p.pole / random.log_uniform(30, 1000) : 0;
   p.encoder = servo && random.coin();
   const double limit = habit == Habit::saturating ? random.uniform(0.4, 0.7) * U : 1e300;
+  const bool dead = habit == Habit::dead_zone || habit == Habit::dead_servo;
+  const double width = dead ? random.uniform(0.1, 0.5) * U : 0;
+  log.curve_size = dead ? width : habit == Habit::square ? U : limit;
   log.least = log.most = p.input_gain;
-  if (habit == Habit::saturating) log.least = 0.2 * p.input_gain;
+  if (habit == Habit::saturating || dead) log.least = 0.2 * p.input_gain;
   std::string& f = log.features;
   f = std::to_string(rows) + " rows, " + (motor ? "motor" : "heater") +
       (one_way ? ", one way" : "") + (counts ? ", counts" : "") + (filtered ? ", filtered" : "") +
@@ -199,6 +206,7 @@ inline OrdinaryLog ordinary_log(std::uint64_t seed, Habit habit) {
       line[at] = u;
       at = (at + 1) % line.size();
       double effect = std::clamp(line[at], -limit, limit);
+      if (dead) effect = std::copysign(std::max(std::abs(effect) - width, 0.0), effect);
       if (habit == Habit::square) effect = effect * std::abs(effect) / U;
       v += (1 - std::exp(-h / p.lag)) * (effect - v);
       v2 = second > 0 ? v2 + (1 - std::exp(-h / second)) * (v - v2) : v;

@@ -124,6 +124,7 @@
 #include <esokit/identify/order_fits.hpp>
 #include <esokit/identify/plateau.hpp>
 #include <esokit/identify/second_opinion.hpp>
+#include <esokit/identify/seen_curve.hpp>
 #include <esokit/identify/sinusoids.hpp>
 #include <esokit/identify/spectrum.hpp>
 #include <esokit/identify/timed_column.hpp>

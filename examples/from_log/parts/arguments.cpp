@@ -30,7 +30,8 @@ columns, by their name, by its end (position of /joint1/position) or beginning, 
   --sample-time S     seconds between rows, if there is no time column; with --time: of a column
                       that counts rows
   --literal NAMES     not to be read into the log: changes (an empty field or a missing row says
-                      that nothing changed), late-u (u was logged a row late)
+                      that nothing changed), late-u (u was logged a row late), curve (the actuator
+                      has a dead zone, or another curve that the log tells)
   --wrap TURN         y is an angle that begins anew after a turn (360, 6.283185, 4096); 0: it does
                       not (default: detected, with an alarm)
   --separator C       one character, or the word tab (default: detected)
@@ -151,8 +152,8 @@ Settings read_arguments(int argc, const char* const* argv) {
          for (std::size_t at = 0; at <= text.size();) {
            const auto comma = std::min(text.find(',', at), text.size());
            const std::string name = text.substr(at, comma - at);
-           if (name != "changes" && name != "late-u")
-             throw LogError("--literal: '" + name + "' is none of changes, late-u");
+           if (name != "changes" && name != "curve" && name != "late-u")
+             throw LogError("--literal: '" + name + "' is none of changes, curve, late-u");
            s.literal.insert(name);
            at = comma + 1;
          }

@@ -163,7 +163,11 @@ Design Design::make(const Settings& settings, const Input& input, const Findings
   Design design;
   const Identified& found = findings.found;
   const auto [least, largest] = std::minmax_element(findings.rows.u.begin(), findings.rows.u.end());
-  const auto limits = settings.limits.value_or(std::pair(*least, *largest));
+  auto limits = std::pair(*least, *largest);
+  if (settings.limits) {
+    limits = {findings.curve.effect(settings.limits->first),
+              findings.curve.effect(settings.limits->second)};
+  }
   auto model = as_printed(esokit::tune_model(found, limits.first, limits.second));
   model.friction = settings.friction;
   const double range = limits.second - limits.first;
@@ -227,7 +231,7 @@ Design Design::make(const Settings& settings, const Input& input, const Findings
   const double T = model.sample_time;
   const LinearController form = design.form();
   const Replay all = through(form, found.input_gain.value, found.order, findings.rows);
-  design.pasting_ = Pasting::make(settings, input, found, model, all,
+  design.pasting_ = Pasting::make(settings, input, findings, model, all,
                                   Feed::make(input, found, model, findings.rows));
   design.told_ = told_rows(design.pasting_.feeds, findings.rows);
   const esokit::FitData& rows = design.told_;
@@ -309,9 +313,10 @@ Design Design::make(const Settings& settings, const Input& input, const Findings
                                    : ""));
   }
   if (!settings.limits) {
-    design.summary_.push_back("The limits of u are those that the log shows, " +
-                              number_text(limits.first, 4) + " to " +
-                              number_text(limits.second, 4) + "; set others with --limits.");
+    design.summary_.push_back(
+        "The limits of " + std::string(findings.curve.seen() ? "the effect of u" : "u") +
+        " are those that the log shows, " + number_text(limits.first, 4) + " to " +
+        number_text(limits.second, 4) + "; set others with --limits.");
   }
   const esokit::FitData machine = simulated(found, rows);
   const Replay expected = through(form, found.input_gain.value, found.order, machine);
@@ -446,7 +451,7 @@ Figure lost_figure(const esokit::Tuning& tuning, const esokit::TunedDesign& desi
 }
 
 /// C++ of a baseline that compiles as it is and checks itself.
-std::string pid_program(const esokit::TunedPid& baseline) {
+std::string pid_program(const esokit::TunedPid& baseline, const ActuatorCode& actuator) {
   const auto exact = [](double value) {
     char text[32];
     std::snprintf(text, sizeof text, "%.17g", value);
@@ -458,23 +463,30 @@ std::string pid_program(const esokit::TunedPid& baseline) {
   std::string wanted;
   for (int k = 0; k < 12; ++k)
     wanted += (k > 0 ? "," : "") + std::string(k % 4 == 0 ? "\n      " : " ") +
-              exact(pid.update(step * (k % 5), 10 * step));
+              exact(actuator.input(pid.update(step * (k % 5), 10 * step)));
   return "// " + baseline.design.name + R"(, as from_log tuned it.
 #include <cmath>
 #include <cstdio>
-#include <esokit/tune/plain_pid.hpp>
+)" + (actuator.curved() ? "#include <esokit/adapter/actuator_map.hpp>\n" : "") +
+         R"(#include <esokit/tune/plain_pid.hpp>
 
 int main() {
   )" + baseline.design.code +
+         (actuator.curved() ? "  // The u that has the effect for which the controller asks.\n"
+                              "  const auto actuator = " +
+                                  actuator.made() + ".value();\n"
+                            : std::string()) +
          R"(  if (!controller) return 1;
   // Self-check: the u that from_log computed.
   const double wanted[] = {)" +
          wanted + R"(};
   for (int k = 0; k < 12; ++k) {
-    const double u = controller->update()" +
-         exact(step) + " * (k % 5), 10 * " + exact(step) + R"();
+    const double u = )" +
+         actuator.from("controller->update(" + exact(step) + " * (k % 5), 10 * " + exact(step) +
+                       ")") +
+         R"(;
     if (!(std::abs(u - wanted[k]) <= )" +
-         exact(1e-8 * half) + R"()) {
+         exact(1e-8 * half * actuator.steepest()) + R"()) {
       std::printf("self-check: sample %d: u is not that of from_log\n", k);
       return 1;
     }
@@ -679,7 +691,7 @@ void Design::show_on(Page& page, const Findings& findings) const {
   }
   for (const auto& baseline : baselines_) {
     if (baseline.design.feasible && baseline.kind != esokit::PidKind::given)
-      page.code(pid_program(baseline), "The code for " + baseline.design.name);
+      page.code(pid_program(baseline, pasting_.actuator), "The code for " + baseline.design.name);
   }
 }
 

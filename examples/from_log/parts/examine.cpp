@@ -83,10 +83,12 @@ std::string usual_factor(double ratio) {
 
 void sound_alarms(const Settings& settings, const Input& input, Findings& all) {
   const esokit::Identified& found = all.found;
-  const auto [least, largest] = std::minmax_element(all.rows.u.begin(), all.rows.u.end());
   if (settings.limits) {
     const auto [lower, upper] = *settings.limits;
-    const double ours = std::max(std::abs(*least), std::abs(*largest));
+    double ours = 0.0;
+    for (const double u : input.log.u) {
+      if (std::isfinite(u)) ours = std::max(ours, std::abs(u));
+    }
     const double told = std::max(std::abs(lower), std::abs(upper));
     if (ours > 1.5 * told || ours < told / 50) {
       all.alarms.push_back(
@@ -237,6 +239,50 @@ void take_earlier(int rows, Input& input, Findings& all) {
           " earlier, which makes the log far more likely. If not, use --literal late-u.");
 }
 
+/// What the curve of an actuator does, in words.
+std::string in_words(const esokit::SeenCurve& curve, const std::string& u) {
+  const std::string size = number_text(curve.size.value, 3);
+  const std::string known = size + " ± " + number_text(curve.size.half_width, 2);
+  switch (curve.kind) {
+    case esokit::CurveKind::dead_zone:
+      return "The actuator has a dead zone: " + u + " does nothing between -" + size + " and " +
+             size + " (± " + number_text(curve.size.half_width, 2) +
+             "), and beyond acts so much less";
+    case esokit::CurveKind::saturation:
+      return "The actuator saturates: " + u + " beyond ± " + known + " does nothing more";
+    default:
+      return "The actuator acts as the square of " + u + ", with its sign";
+  }
+}
+
+/// The effect in place of u, where the log tells the curve of the actuator: b0 is one number then.
+/// Not if the log tells it, and is refused with the curve.
+void take_effect(esokit::IdentifyOptions options, Input& input, Findings& all) {
+  const esokit::SeenCurve curve = all.found.curve;
+  const esokit::Log acted = curve.acted(input.log);
+  options.late_input = options.late_input && all.found.late_rows == 0;
+  const auto found = compiled::study(acted, options);
+  if (!found) return;
+  const auto verdict = esokit::judge(*found, acted, options);
+  if (!verdict && !all.refusal) return;
+  all.refusal.reset();
+  if (!verdict) all.refusal = verdict.error();
+  const double before = all.found.input_gain.value;
+  all.found = *found;
+  all.curve = curve;
+  all.rows = compiled::prepare(acted)->data;
+  if (found->late_rows > 0) take_earlier(found->late_rows, input, all);
+  input.notes.insert(input.notes.begin(),
+                     in_words(curve, "u (" + input.u + ")") +
+                         ". The squares of what the model does not explain are " +
+                         number_text(100 * curve.left, 2) +
+                         " % with this curve, and b0 does not depend on the size of u (without it "
+                         "b0 is " +
+                         number_text(before, 3) +
+                         " on the average). So below, u is the effect, in the unit of u, and the "
+                         "code puts out the u that has it. If not, use --literal curve.");
+}
+
 /// What is left when the model has explained what it can.
 void say_residual(const compiled::Residual& residual, Findings& all) {
   const auto& e = residual.values;
@@ -356,7 +402,8 @@ Findings examine(const Settings& settings, Input& input) {
   if (found->late_rows > 0) take_earlier(found->late_rows, input, all);
   if (const auto verdict = esokit::judge(*found, input.log, options); !verdict)
     all.refusal = verdict.error();
-  const auto residual = compiled::residual_of(*found, all.rows);
+  if (found->curve.seen() && !settings.literal.contains("curve")) take_effect(options, input, all);
+  const auto residual = compiled::residual_of(all.found, all.rows);
   const auto& e = residual.values;
   double square = 0.0;
   for (const double value : e) square += value * value;

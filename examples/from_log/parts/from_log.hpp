@@ -41,7 +41,7 @@ struct Settings {
   std::string time_unit;                    ///< day, h, min, s, ms, us, 100ns, ns; empty: found
   double sample_time = 0;                   ///< s from row to row, where there is no time, or its
                                             ///< column counts rows
-  std::set<std::string> literal;  ///< what is not to be read into the log: changes, late-u
+  std::set<std::string> literal;  ///< what is not to be read into the log: changes, curve, late-u
   char separator = 0;             ///< 0: found out
   std::optional<double> wrap;     ///< y begins anew after so much; 0: it does not; none: found out
   std::vector<int> orders{};  ///< empty: 1 for a speed, a temperature or a level, else found out
@@ -110,6 +110,9 @@ struct Findings {
   esokit::Identified found;
   std::optional<esokit::Error<double>> refusal;
   esokit::FitData rows;  ///< at one sample time
+  /// Of the actuator, where the log tells it: then u of the rows, and of all that follows from
+  /// them, is the effect.
+  esokit::SeenCurve curve;
   Spectrum u, y, residual;
   std::vector<double> residual_correlation;  ///< lags 1, 2, ..
   double correlation_band = 0;               ///< white ones stay within this, 95 %

@@ -207,6 +207,7 @@ std::string includes_of(const std::string& code) {
   };
   constexpr Header headers[] = {{"Guarded<", "adapter/guarded.hpp"},
                                 {"OutlierGate<", "adapter/outlier_gate.hpp"},
+                                {"ActuatorMap<", "adapter/actuator_map.hpp"},
                                 {"Adrc<", "control/adrc.hpp"},
                                 {"ApproachProfile<", "control/approach_profile.hpp"},
                                 {"HealthMonitor<", "control/health.hpp"},
@@ -252,6 +253,12 @@ std::string wrapped(const std::string& text, const std::string& indent, const ch
 
 std::string comment(const std::string& text, const std::string& indent = "") {
   return wrapped("// " + text, indent, "// ", " ");
+}
+
+std::string exact(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.17g", value);
+  return text;
 }
 
 std::string list(const std::vector<double>& numbers) {
@@ -444,9 +451,23 @@ double Pasting::approach(const TuneModel& model, int gains) const {
   return printed(0.7 / (model.latency() - (gains == 2 ? model.lag : 0.0)));
 }
 
-Pasting Pasting::make(const Settings& settings, const Input& input, const esokit::Identified& found,
+std::string ActuatorCode::made() const {
+  return std::string("esokit::ActuatorMap<>::make(esokit::ActuatorCurve<>::") +
+         (seen.kind == esokit::CurveKind::square ? "square" : "dead_zone") + "(" +
+         source(seen.size.value) + "))";
+}
+
+double ActuatorCode::steepest() const {
+  const double little = 1e-3 * seen.size.value;
+  return curved() ? input(little) / little : 1.0;
+}
+
+Pasting Pasting::make(const Settings& settings, const Input& input, const Findings& findings,
                       const TuneModel& model, const Replay& replay, std::vector<Feed> feeds) {
+  const esokit::Identified& found = findings.found;
   Pasting p;
+  p.actuator.seen = findings.curve;
+  p.actuator.seen.size.value = printed(findings.curve.size.value);
   p.feeds = std::move(feeds);
   const std::string name = source_of(settings).file_name();
   p.order = model.order;
@@ -514,6 +535,13 @@ Pasting Pasting::make(const Settings& settings, const Input& input, const esokit
       comment("y is '" + input.y + "' and u is '" + input.u +
               "' in the units of the log, times are in s; b0 is " + highest +
               " per unit of u, d and forces are in the unit of " + highest + ".") +
+      (p.actuator.curved()
+           ? comment("u below is its effect, in the unit of u: the actuator " +
+                     std::string(findings.curve.kind == esokit::CurveKind::square
+                                     ? "acts as the square of u"
+                                     : "has a dead zone") +
+                     ", and update gives the u with the effect for which the law asks.")
+           : std::string()) +
       comment(
           "This file checks itself: g++ -std=c++20 -O2 -I esokit/include FILE.cpp && ./a.out. "
           "Then take main away, and call start once and update every " +
@@ -753,7 +781,9 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
         "  }\n"
         "};\n";
   }
+  const bool curved = p.actuator.curved();
   body += "\nstruct Loop {\n";
+  if (curved) body += "  esokit::ActuatorMap<> actuator;  // from the effect to u\n";
   body += "  esokit::Adrc<Observer> controller;\n";
   const bool approaches = p.order == 1;
   const std::string profile =
@@ -852,9 +882,15 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
       "      if (!made) std::printf(\"%s: %s\\n\", made.error().field, made.error().rule);\n"
       "      return !made;\n"
       "    };\n"
-      "    if (fails(controller) || fails(profile) || fails(monitor)) return {};\n"
-      "    return Loop{*controller, *profile, *monitor};\n"
-      "  }\n";
+      "    if (fails(controller) || fails(profile) || fails(monitor)) return {};\n";
+  if (curved) {
+    body += comment("The curve that the log tells, and the u with an effect.", "    ") +
+            "    const auto actuator = " + p.actuator.made() +
+            ";\n    if (fails(actuator)) return {};\n";
+  }
+  body += std::string("    return Loop{") + (curved ? "*actuator, " : "") +
+          "*controller, *profile, *monitor};\n"
+          "  }\n";
   const bool damps = p.order == 2 && p.pole > 0.0;
   const bool along = p.friction > 0.0 || p.by_position || damps;
   if (along) {
@@ -899,6 +935,7 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
     fed_at_start += (fed_at_start.empty() ? "" : " + ") + name + ".factor * " + name + ".before";
   }
   body += std::string("  void start(double y, double u_now) {\n") +
+          (curved ? "    u_now = actuator.effect(u_now);\n" : "") +
           (approaches ? "    profile.start(y, u_now);\n" : "    profile.reset(y);\n") + starts +
           (known ? "    u = u_now;\n    fed = " + (fed_at_start.empty() ? "0.0" : fed_at_start) +
                        ";\n    controller.start(y, u - fed);\n"
@@ -921,18 +958,19 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
         "    const double more = " +
         more +
         ";\n"
-        "    controller.applied(u - fed);  // if the actuator reports what it really held, in "
-        "place "
-        "of u\n"
+        "    controller.applied(u - fed);  // if the actuator reports what it really held, " +
+        (curved ? "the effect of it " : "") +
+        "in place of u\n"
         "    const double of_law = controller.update(y, r);\n"
         "    // Without y nothing is added.\n"
         "    fed = controller.mode() == esokit::LoopMode::safe ? 0.0 : more;\n"
         "    u = std::clamp(of_law + fed, " +
         source(model.u_min) + ", " + source(model.u_max) + ");\n";
   } else {
-    body +=
-        "    // If the actuator reports what it really held, say controller.applied(..) before.\n"
-        "    const double u = controller.update(y, profile.motion());\n";
+    body += "    // If the actuator reports what it really held, say controller.applied(" +
+            std::string(curved ? "actuator.effect(..)" : "..") +
+            ") before.\n"
+            "    const double u = controller.update(y, profile.motion());\n";
   }
   body +=
       "    monitor.look(controller);\n"
@@ -940,7 +978,8 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
       "    // fault (advice of analysis/health_text.hpp says what to do). wrong_sign,\n"
       "    // gain_too_small: set u to its safe value. measurements_rejected: look at the sensor.\n"
       "    // controller.mode() is LoopMode::safe where measurements are missing for long.\n"
-      "    return u;\n  }\n};\n\n";
+      "    return " +
+      p.actuator.from("u") + ";\n  }\n};\n\n";
 
   // The self-check: a step that takes about 60 samples, if u can hold its end.
   double height =
@@ -961,7 +1000,8 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
   std::string samples;
   for (std::size_t k = 0; k < checked && k < simulated.y.size(); ++k) {
     char text[80];
-    std::snprintf(text, sizeof text, "{%.9g,%.10g}", simulated.y[k], simulated.u[k]);
+    std::snprintf(text, sizeof text, "{%.9g,%.10g}", simulated.y[k],
+                  p.actuator.input(simulated.u[k]));
     samples += (k > 0 ? ", " : "") + std::string(text);
   }
   body +=
@@ -989,7 +1029,7 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
       "  auto loop = Loop::make();\n"
       "  if (!loop) return 1;\n"
       "  loop->start(" +
-      source(p.start_y) + ", " + source(p.start_u) +
+      source(p.start_y) + ", " + (curved ? exact(p.actuator.input(p.start_u)) : source(p.start_u)) +
       ");\n"
       "  for (int k = 0; k < " +
       std::to_string(checked) + "; ++k) {\n" + given +
@@ -997,7 +1037,7 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
       source(p.start_y) + " : " + source(target) +
       ");\n"
       "    if (std::abs(u - samples[k][1]) < " +
-      source(1e-8 * half) +
+      source(1e-8 * half * p.actuator.steepest()) +
       ") continue;\n"
       "    std::printf(\"self-check: sample %d: u is %.9g, not %.9g\\n\", k, u, "
       "samples[k][1]);\n"

@@ -80,6 +80,24 @@ struct Replay {
 /// The numbers as the code prints them, so that all that is said is said of the code.
 [[nodiscard]] esokit::TuneModel as_printed(esokit::TuneModel model);
 
+/// The way from the effect, for which the law asks, to u.
+struct ActuatorCode {
+  esokit::SeenCurve seen;  ///< its numbers as printed
+
+  /// Whether the code has a map: not where u only has limits.
+  [[nodiscard]] bool curved() const { return seen.curve().points > 0; }
+  [[nodiscard]] double input(double effect) const {
+    return esokit::ActuatorMap<>::make(seen.curve()).value().input(effect);
+  }
+  /// As the code says it: the map, and the u with an effect.
+  [[nodiscard]] std::string made() const;
+  [[nodiscard]] std::string from(const std::string& effect) const {
+    return curved() ? "actuator.input(" + effect + ")" : effect;
+  }
+  /// Largest change of u with an effect.
+  [[nodiscard]] double steepest() const;
+};
+
 /// What the code has beside the design: the same for all designs of a page.
 struct Pasting {
   std::string head;                 ///< the comment at its beginning
@@ -97,10 +115,11 @@ struct Pasting {
   double room = 0;                  ///< what the forces of the log leave of u, unit of y^(n)
   double shortest = 0;              ///< no move of the profile is shorter, s
   std::vector<Feed> feeds;          ///< of the measured disturbances
+  ActuatorCode actuator;            ///< u of all else is its effect
 
   /// @param replay of the log
   [[nodiscard]] static Pasting make(const Settings& settings, const Input& input,
-                                    const esokit::Identified& found, const esokit::TuneModel& model,
+                                    const Findings& findings, const esokit::TuneModel& model,
                                     const Replay& replay, std::vector<Feed> feeds);
 
   /// Whether the code adds what is known of the machine to u.

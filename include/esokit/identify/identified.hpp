@@ -14,6 +14,7 @@
 #include <esokit/identify/measured_columns.hpp>
 #include <esokit/identify/plateau.hpp>
 #include <esokit/identify/second_opinion.hpp>
+#include <esokit/identify/seen_curve.hpp>
 #include <esokit/identify/sinusoids.hpp>
 #include <esokit/model/augmented_model.hpp>
 #include <esokit/model/linear_plant.hpp>
@@ -141,6 +142,7 @@ struct Identified {
   double correlation = 0;          ///< largest correlation of the innovations over lags 1 to 20
   SecondOpinion second_opinion{};  ///< b0 by output error
   GainBySize by_size{};            ///< b0 at small and at large u
+  SeenCurve curve{};               ///< of the actuator, where b0 depends on the size of u
   GainInMotion in_motion{};        ///< b0 in motion and at standstill, of order 2; not if `held`
 
   /// Share of the rows at standstill in which friction holds the machine against u (order 2), so

@@ -7,6 +7,7 @@
 #include <esokit/core/compiled.hpp>
 #include <esokit/identify/fit.hpp>
 #include <esokit/identify/intervals.hpp>
+#include <utility>
 #include <vector>
 
 namespace esokit {
@@ -46,6 +47,10 @@ struct Lead {
 };
 
 namespace detail {
+
+/// b0 and that of the further input of `data` alone, at the bandwidth of `at`.
+std::pair<Estimate, Estimate> two_gains(const FitData& data, const FitModel& model,
+                                        const FitBounds& bounds, const FitPoint& at);
 
 /// b0 in motion and at standstill, at the bandwidth of `here`. @param speed of each row
 GainInMotion gain_in_motion(const FitData& data, const FitModel& model, const FitBounds& bounds,

@@ -33,6 +33,7 @@
 #include <esokit/identify/impl/order_fits.ipp>
 #include <esokit/identify/impl/plateau.ipp>
 #include <esokit/identify/impl/second_opinion.ipp>
+#include <esokit/identify/impl/seen_curve.ipp>
 #include <esokit/identify/impl/sinusoids.ipp>
 #include <esokit/identify/impl/spectrum.ipp>
 #include <esokit/identify/impl/timed_column.ipp>

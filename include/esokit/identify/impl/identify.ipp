@@ -17,6 +17,7 @@
 #include <esokit/identify/order_fits.hpp>
 #include <esokit/identify/plateau.hpp>
 #include <esokit/identify/second_opinion.hpp>
+#include <esokit/identify/seen_curve.hpp>
 #include <esokit/identify/sinusoids.hpp>
 #include <functional>
 #include <iterator>
@@ -362,13 +363,15 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
   if (excitation < excitation_max) {
     result.by_size = gain_by_size(used, model, bounds, here.fit.at);
     if (result.held > 0.0) {
-      // Where it holds, small u does little: that is known already.
+      // Where it holds, small u does little: that is known already, and no curve can be told.
       GainBySize& sizes = result.by_size;
       if ((std::abs)(sizes.below.value) < (std::abs)(sizes.above.value)) sizes = {};
     } else if (model.order == 2) {
       if (speed.empty()) speed = friction_speed(rows, 2, chosen.fit.noise, chosen.fit.at.latency);
       result.in_motion = gain_in_motion(used, model, bounds, here.fit, speed);
     }
+    if (!(result.held > 0.0))
+      result.curve = seen_curve(used, model, bounds, here.fit, result.by_size);
   }
   if (!(result.held > 0.0)) result.lead = lead_of(used, model, bounds, here.fit);
   if (const SecondOpinion& second = result.second_opinion;

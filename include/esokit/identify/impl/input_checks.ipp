@@ -26,9 +26,9 @@ ESOKIT_FUNCTION bool GainInMotion::differ() const {
 
 namespace detail {
 
-/// b0 and that of the further input of `data` alone, at the bandwidth of `at`.
-inline std::pair<Estimate, Estimate> two_gains(const FitData& data, const FitModel& model,
-                                               const FitBounds& bounds, const FitPoint& at) {
+ESOKIT_FUNCTION std::pair<Estimate, Estimate> two_gains(const FitData& data, const FitModel& model,
+                                                        const FitBounds& bounds,
+                                                        const FitPoint& at) {
   InnovationsFit fit(data, model, bounds);
   const Fit best = fit.minimise(at, false, 8);
   const FitErrors errors = jackknife(fit, best, false);
