@@ -26,6 +26,12 @@ std::string identifier(const std::string& stem) {
 }
 
 void write_code(const from_log::Design& design, const std::string& page) {
+  if (design.pasting().actuator.curved()) {
+    std::fprintf(stderr,
+                 "no C: a controller behind the curve of an actuator is written in C++ only; "
+                 "--literal curve leaves the curve out\n");
+    return;
+  }
   const auto& model = design.tuning().model;
   const auto stem = std::filesystem::path(page).replace_extension();
   const esokit::CodeOptions options{.name = identifier(stem.filename().string()),
