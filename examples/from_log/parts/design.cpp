@@ -256,9 +256,9 @@ Design Design::make(const Settings& settings, const Input& input, const Findings
       "The modulus margin is " + number_text(taken.modulus_margin, 2) + ", the delay margin " +
           duration_text(taken.delay_margin) + ", the phase margin " +
           number_text(taken.phase_margin * 180 / std::numbers::pi, 3) +
-          "°, each the smallest over the intervals. Deviations of y and u are " +
-          number_text(taken.excess, 3) +
-          " times those of the best linear controller, which keeps no margins."};
+          "°, each the smallest over the intervals. Errors of y and u are " +
+          number_text(100 * (taken.excess - 1), 2) +
+          " % above the theoretical best, which has no safety margin."};
   design.baselines_ = esokit::tune_pids(*tuning);
   design.summary_.push_back(against_pid(design.baselines_, taken));
   if (const auto& best = design.baselines_.front(); best.design.feasible) {

@@ -351,8 +351,11 @@ std::vector<std::string> in_short(const Findings& findings, const Design& design
   }
   const esokit::SecondOpinion& second = findings.found.second_opinion;
   if (findings.seen && second.informative()) {
-    all.push_back("Output error, which believes u and the model alone, finds b0 = " +
-                  with_interval(second.input_gain) + ".");
+    const auto& first = found.input_gain;
+    const bool agrees = std::abs(second.input_gain.value - first.value) <=
+                        second.input_gain.half_width + first.half_width;
+    all.push_back("Second fit, which simulates y from u alone: b0 = " +
+                  with_interval(second.input_gain) + (agrees ? " (agrees)." : " (differs)."));
   }
   if (findings.seen && !findings.refusal && findings.found.input_gain.share() > 0.1) {
     all.push_back("Warning: b0 is known to " +

@@ -57,9 +57,9 @@ ESOKIT_FUNCTION std::vector<TuneAlarm> alarms(const Tuning& tuning, const TunedD
                                 " %. Measure y with less noise, or sample faster."});
   }
   if (design.excess > 3.0) {
-    all.push_back({"excess", "Deviations of y and u are " + number(design.excess) +
-                                 " times those of the best linear controller: the rules leave "
-                                 "little of what this machine could do. It is limited by: " +
+    all.push_back({"excess", "Errors of y and u are " + number(design.excess) +
+                                 " times the theoretical best: the rules leave little of what "
+                                 "this machine could do. It is limited by: " +
                                  design.constraint + "."});
   }
   return all;
