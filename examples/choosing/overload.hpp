@@ -72,7 +72,7 @@ struct Machine {
   }
 };
 
-/// Machine `number` of a seed, and what a log would have told of it.
+/// Machine `number` of a seed, and what a log would have shown of it.
 struct Drawn {
   Machine machine;
   esokit::TuneModel model;

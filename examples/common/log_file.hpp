@@ -370,7 +370,7 @@ class LogFile {
       }
       return false;
     };
-    // What numbers, names and separators are is told by the first lines together.
+    // What numbers, names and separators are the first lines say together.
     constexpr std::size_t ahead = 200;
     std::vector<Head> heads;
     std::size_t text_lines = 0;

@@ -18,7 +18,7 @@ namespace esokit::examples {
 struct Stamp {
   long double seconds = 0;     ///< of its day, or since its start
   std::optional<long> day;     ///< days since 1970, or of a duration; none: a time of day
-  bool zone = false;           ///< the offset from UTC is told, and taken off
+  bool zone = false;           ///< the offset from UTC is given, and taken off
   std::string_view date;       ///< as written
   bool either = false;         ///< it may be day/month or month/day
   bool clock_unclear = false;  ///< it may be hours:minutes or minutes:seconds
@@ -224,7 +224,7 @@ class StampReader {
     return static_cast<double>(value - first_);
   }
 
-  /// Whether they are numbers, whose unit has to be told.
+  /// Whether they are numbers, whose unit has to be given.
   [[nodiscard]] bool numbers() const { return number_; }
   /// The first number.
   [[nodiscard]] double origin() const { return number_ ? static_cast<double>(first_) : 0.0; }

@@ -35,7 +35,7 @@ class Design {
   [[nodiscard]] const esokit::TunedDesign& taken() const { return tuning_->designs[taken_]; }
   /// The choice, its model and its baselines.
   [[nodiscard]] const esokit::Tuning& tuning() const { return *tuning_; }
-  /// The controller as a linear system that is told what the actuator held.
+  /// The controller as a linear system that knows what the actuator held.
   [[nodiscard]] esokit::LinearController form() const {
     return esokit::detail::given_input_form(taken().controller);
   }
@@ -57,7 +57,7 @@ class Design {
   std::string why_not_;
   std::vector<Alarm> alarms_;
   Replay replay_;
-  esokit::FitData told_;                     ///< the log as the observer is told of it
+  esokit::FitData told_;                     ///< the log as the observer knows it
   std::vector<esokit::TunedPid> baselines_;  ///< the best PIDs, and the given one
   esokit::Migration migration_;              ///< from the given PID
   esokit::Migration to_best_;                ///< from it to the best PID

@@ -54,7 +54,7 @@ class FeedPath {
   double held_ = 0, before_ = 0, v_ = 0;
 };
 
-/// Rows with the u that the observer is told: without what measured disturbances ask for.
+/// Rows with the u that the observer receives: without what measured disturbances ask for.
 [[nodiscard]] esokit::FitData told_rows(const std::vector<Feed>& feeds,
                                         const esokit::FitData& rows);
 

@@ -31,8 +31,8 @@ requires(detail::is_a_plain_scalar<S>()) struct TimeProportionedConfig {
 ///     controller.applied(relay.applied());               // what really went out
 ///
 /// On comes first in a window. Times that a window cannot have (parts of a sample, less than the
-/// least on or off time) are rounded to the nearest that it can, and the remainder is carried to
-/// the next one: the mean over many windows is that of u. What is carried never exceeds half a
+/// least on or off time) are rounded to the nearest that it can. The remainder is carried to the
+/// next one: the mean over many windows is that of u. What is carried never exceeds half a
 /// sample, or half of a least time. `applied` is the mean of this window, known from its start.
 ///
 /// A controller that is faster than the window sees the windows in y and fights them. A window is

@@ -19,9 +19,10 @@ enum class CurveKind {
 };
 
 /// What the actuator makes of u, as the log tells it. It is there only where b0 depends on the size
-/// of u, the curve makes the log far more likely than b0 alone and than the other curve (e^20), and
-/// leaves a b0 that does not depend on it. Never of u with two levels, nor where friction holds the
-/// machine (`Identified::held`). Of order 1 friction that sticks counts as a part of a dead zone.
+/// of u. The curve then makes the log far more likely than b0 alone and than the other curve
+/// (e^20), and leaves a b0 that does not depend on it. Never of u with two levels, nor where
+/// friction holds the machine (`Identified::held`). Of order 1 friction that sticks counts as a
+/// part of a dead zone.
 ///
 /// The b0 beside it is that of u as it was logged: `identify(curve.acted(log))` gives that of the
 /// effect, for an observer in MappedInput.

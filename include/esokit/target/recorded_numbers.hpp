@@ -95,7 +95,7 @@ struct TurnNumbers {
 struct WrapNumbers {
   double period = 0;  ///< 0: there is none
   double inverse_period = 0;
-  double most_turns = 0;  ///< more cannot be told apart
+  double most_turns = 0;  ///< more cannot be distinguished
   TurnNumbers count{};
   bool gated = false;  ///< around a gate: the rest counts over all measurements
   TurnNumbers heard{};

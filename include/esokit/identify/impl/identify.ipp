@@ -363,7 +363,7 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
   if (excitation < excitation_max) {
     result.by_size = gain_by_size(used, model, bounds, here.fit.at);
     if (result.held > 0.0) {
-      // Where it holds, small u does little: that is known already, and no curve can be told.
+      // Where it holds, small u does little: that is known already, and no curve can be found.
       GainBySize& sizes = result.by_size;
       if ((std::abs)(sizes.below.value) < (std::abs)(sizes.above.value)) sizes = {};
     } else if (model.order == 2) {
