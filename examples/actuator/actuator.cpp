@@ -1,6 +1,6 @@
-// Three actuators that are no straight line, with MappedInput and without it: a small motor with a
-// dead zone, a Peltier element that cools less than it heats, and a thruster under water whose
-// thrust is the square of u.
+// Three actuators that are no straight line, with MappedInput and without it. A small motor has a
+// dead zone, a Peltier element cools less than it heats, and the thrust of a thruster under water
+// is the square of u.
 //
 // Motor       y'' = 50 (u without its dead zone of 3 V) - 3 y', |u| <= 12 V; encoder of 4096 counts
 // Peltier     y' = 0.5 effect(u) + load - (y - 25) / 60, cooling 0.3 times as much, |u| <= 1; the

@@ -1,6 +1,6 @@
 // Why a cascade wins on noise, and where it loses: LESO and cascades p = 2, 3 with the same
 // disturbance bandwidth, in the frequency domain. At equal bandwidth the noise in dhat falls to a
-// quarter with the second level and by a fifth more with the third; the price is an estimate that
+// quarter with the second level and by a fifth more with the third. The price is an estimate that
 // peaks and lags in the decade below the bandwidth.
 //
 // The cascade is that of K. Lakomy, R. Madonski, "Cascade extended state observer for active

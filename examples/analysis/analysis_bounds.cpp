@@ -1,8 +1,8 @@
 // How good the error bounds of the papers are: bound, true worst case, and simulation.
 //
 // Bounds, in corrected form: K. Lakomy, R. Madonski, ISA Transactions 109 (2021) 1-10, (11), (22),
-// (30); S. Zhang, X. Qi, S. Yang, J. Systems Engineering and Electronics (2023),
-// doi:10.23919/JSEE.2023.000166, (15), (20), (21); A. T. Azar et al., Mathematics 10 (2022) 2261,
+// (30). S. Zhang, X. Qi, S. Yang, J. Systems Engineering and Electronics (2023),
+// doi:10.23919/JSEE.2023.000166, (15), (20), (21). A. T. Azar et al., Mathematics 10 (2022) 2261,
 // doi:10.3390/math10132261, (34), (35).
 //
 // Way: continuous simulation, plant and continuous observer as one ODE, Runge-Kutta of order 4. The

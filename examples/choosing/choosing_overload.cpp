@@ -1,14 +1,14 @@
-// Drawn machines of orders 1 to 3 behind the limits of their actuators: does the controller that
-// tune recommends come back after loads, kicks, steps and a lost actuator?
+// Random plants of orders 1 to 3 behind the limits of their actuators: does the controller that
+// tune recommends recover from loads, kicks, steps and a lost actuator?
 //
-// Way: a model with intervals, as a log gives it (overload.hpp); tune with its defaults; the first
-// design as the Adrc that runs, on a machine with friction, gravity, a second lag, a sensor's lag
+// Way: a model with intervals, as a log gives it (overload.hpp), and tune with its defaults. The
+// first design runs as an Adrc on a machine with friction, gravity, a second lag, a sensor's lag
 // and an encoder that the model does not have. A load pulse as large as u can balance is 100 %. An
 // event counts if u can hold its end, and where gravity lets the machine fall, if bang-bang with
 // the true state brings it back after one 1 / 0.6 times as large. A PID by the rules of SIMC from
 // the same model, with the same limits and the noise in u that is allowed, goes through the same
-// events. After load pulses of 50 % there are two more: one tuned as those are that record the logs
-// of identify/, with the true b, and SIMC slowed until it is as quiet as our design.
+// events. After load pulses of 50 % there are two more. One is tuned with the true b as those are
+// that record the logs of identify/, one is SIMC slowed until it is as quiet as our design.
 //
 // symbol   code                     value
 // back     -                        abs(y - r) below 2 % of its peak + 4 deviations of the noise
@@ -18,12 +18,12 @@
 // slow                              not so, but back if one waits as long as tune's own play
 //                                   does: 25 times the event
 // locked                            not back, and more than a fifth of the last horizon at a limit
-// hunting                           not back, and y swings by more than half of its error, off the
-//                                   limits
+// hunting                           not back, and y oscillates by more than half of its error, off
+//                                   the limits
 // drifting                          else not back
 //
 // Order 3 is recommended only if it stands friction, which no model has: an actuator that
-// integrates, friction, and the integral of the observer swing for ever. What then is not
+// integrates, friction, and the integral of the observer oscillate for ever. What then is not
 // recommended is said with its reason, and the runs that a design without this rule would lose are
 // not counted.
 //
@@ -229,7 +229,7 @@ struct Outcome {
   std::vector<std::string> names;
   std::vector<bool> counted;
   std::vector<Played> own, pid;  ///< of the events that count, else empty ones; `pid`: the fastest
-  bool compared = false;         ///< with the rivals, after load pulses of 50 %
+  bool compared = false;         ///< with the baselines, after load pulses of 50 %
   std::array<double, 3> peak{}, integral{};  ///< largest, ours over theirs
   double noise = 0.0;                        ///< standard deviation of u, idle
   std::array<double, 3> rival_noise{};       ///< the same
@@ -373,7 +373,7 @@ int main(int argc, char** argv) {
   std::vector<std::string> names;
   std::array<int, 3> designed{}, alarmed{}, count{}, bad{}, compared{};
   std::array<std::array<int, kinds.size()>, 3> of_kind{}, pid_too{};
-  // By order and rival.
+  // By order and baseline.
   std::array<std::array<int, rivals.size()>, 3> better{};
   std::array<std::array<std::vector<double>, rivals.size()>, 3> peaks, integrals, noises;
   std::array<std::array<std::vector<double>, 3>, 3> prices;

@@ -2,7 +2,7 @@
 // margins and the same noise in u, on four machines of the trades. Designed once on the nominal
 // machine, run on drawn ones.
 //
-// choosing_pid OUT [--count N] [--seed S]: drawn machines of each kind (CI: 6).
+// choosing_pid OUT [--count N] [--seed S]: random plants of each kind (CI: 6).
 
 #include <algorithm>
 #include <array>
@@ -90,7 +90,7 @@ struct Row {
 enum class Lost { y, error, frozen };
 
 /// A PID. Along a profile it acts on the error, filter and derivative too, beside a feed-forward of
-/// the derivatives of the reference, lag included; a step gets its weight of the reference, or with
+/// the derivatives of the reference, lag included. A step gets its weight of the reference, or with
 /// a bandwidth goes through a reference model of n + 2 poles there, as a profile.
 /// @param profile whether the reference is one
 Running running(const PlainPidConfig& config, const TuneModel& model, Lost rule, double bandwidth,
@@ -585,7 +585,7 @@ int main(int argc, char** argv) {
             typical(row, c) < 0.999 * typical(variant, c))
           variant = row;
       }
-      // Which of two loops that swing swings more is no verdict.
+      // Which of two loops in a limit cycle has the larger one is no verdict.
       const double lost = cases[c].wrong == Wrong::nothing ? std::numeric_limits<double>::infinity()
                                                            : 10.0 * typical(best, load_step);
       for (std::size_t row = 0; row < 2; ++row) {

@@ -2,13 +2,13 @@
 //
 // Plants: families of the test batch of Astrom and Hagglund (Revisiting the Ziegler-Nichols step
 // response method for PID control, J. Process Control 14 (2004) 635-650; Benchmark systems for PID
-// control, IFAC PID 2000), and the example with which Skogestad shows the half rule (Simple
+// control, IFAC PID 2000). Also the example with which Skogestad shows the half rule (Simple
 // analytic rules for model reduction and PID controller tuning, J. Process Control 13 (2003)
 // 291-309). Criterion: load IAE under a limit of the sensitivity and of the noise in u, with a
-// filter of second order on y (Garpinger, Hagglund and Astrom, Performance and robustness
-// trade-offs in PID control, J. Process Control 24 (2014) 568-577). Sweeps: G. Herbst, A simulative
-// study on active disturbance rejection control (ADRC) as a control tool for practitioners,
-// Electronics 2 (2013) 246-279.
+// filter of second order on y. It is that of Garpinger, Hagglund and Astrom, Performance and
+// robustness trade-offs in PID control, J. Process Control 24 (2014) 568-577. Sweeps: G. Herbst, A
+// simulative study on active disturbance rejection control (ADRC) as a control tool for
+// practitioners, Electronics 2 (2013) 246-279.
 
 #include <algorithm>
 #include <array>
@@ -322,8 +322,8 @@ void half_rules(Report& report, const std::vector<Plant>& plants) {
                          1e-3, "closed form");
 }
 
-/// Herbst's process of order 1, K / (T s + 1) with K = T = 1, b_0 = K / T, settling time 1 s,
-/// observer ten times as fast as the law, while K or T differs.
+/// Herbst's process of order 1, K / (T s + 1) with K = T = 1, b_0 = K / T, settling time 1 s, while
+/// K or T differs. The observer is ten times as fast as the law.
 void sweep(Report& report) {
   constexpr double wc = 4.0, wo = 40.0, T = 0.0025;
   const auto adrc = Adrc<LinearEso<1>>::make(

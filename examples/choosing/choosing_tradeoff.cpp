@@ -1,5 +1,6 @@
-// Which observer: every family at its best for one wish after another, beside the least that any
-// linear controller can do. The ranking is that of `tune`; this is its picture without units.
+// Which observer: every family at its best for one specification after another, beside the least
+// that any linear controller can do. The ranking is that of `tune`; this is its picture without
+// units.
 //
 // Way: exact (the loop at the samples, under noise and a disturbance that walks; tune/tune.hpp).
 //
@@ -65,7 +66,7 @@ std::vector<Case> cases() {
   return all;
 }
 
-/// Noise in u of the LQG whose law has this bandwidth: the wish that leads to it.
+/// Noise in u of the LQG whose law has this bandwidth: the specification that leads to it.
 double wish_of(const TuneModel& model, double bandwidth) {
   TuneModel walking = model;
   walking.sinusoids.clear();
@@ -152,7 +153,7 @@ int main(int argc, char** argv) {
   }
   report.add(figure);
 
-  // The ranking at one wish, as `tune` gives it.
+  // The ranking at one specification, as `tune` gives it.
   constexpr std::size_t middle = 4;
   for (std::size_t c = 0; c < all.size(); ++c) {
     const Tuning& tuning = tunings[c * wishes + middle];

@@ -6,7 +6,7 @@
 //     u = k r - (Q(z) y + P(z) u) / Lambda(z),   k = Q(1) / Lambda(1),   P(1) = -Lambda(1)
 //
 // linear in the numerators (the last two for integral action). If the loop shall answer a reference
-// by M, the log of a machine is that of this controller under the virtual reference r = y / M.
+// by M, the log of a machine is that of this controller under the virtual reference y / M = r.
 // Filtered by F = M (1 - M) that is a least-squares problem, without a model of the machine. Its
 // instruments are the recorded reference, so that noise, friction and drift of the log do not bias
 // it (two stages).
@@ -84,7 +84,7 @@ struct Numerators {
   }
 };
 
-/// Those of a controller that is told the applied u.
+/// Those of a controller that knows the applied u.
 Numerators numerators(const LinearController& c) {
   Numerators found;
   std::vector<Complex> lambda{1.0};
@@ -169,9 +169,9 @@ Numerators virtual_reference(const RandomLog& log, const esokit::DynamicSystem& 
   const Signal u_filtered = over(lambda, mu), y_filtered = over(lambda, my);
   const std::size_t n = lambda.size() - 1;
   const double sum = Numerators::at_one(lambda);
-  // In powers of 1 - 1 / z, of which samples much shorter than the poles make numbers that differ:
-  // Q = sum q_i (1 - 1/z)^i, i < N, P = (p_0 + p_1 (1 - 1/z) + ..) / z, k = q_0 / Lambda(1) and
-  // p_0 = -Lambda(1), so
+  // In powers of 1 - 1 / z, of which samples much shorter than the poles make numbers that differ.
+  // Q = sum q_i (1 - 1/z)^i, i < N, P = (p_0 + p_1 (1 - 1/z) + ..) / z, k = q_0 / Lambda(1) and p_0
+  // = -Lambda(1), so
   //   mu - Lambda(1) u_0 = q_0 (y / Lambda(1) - y_0) - sum q_i y_i - sum p_i u_i.
   Eigen::MatrixXd regressors(rows, static_cast<Eigen::Index>(2 * n - 1));
   Signal yi = y_filtered, ui = later(u_filtered, 1);

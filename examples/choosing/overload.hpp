@@ -1,6 +1,6 @@
 /// @file
-/// Drawn machines that a design is played on: what no model has in it (friction, gravity, a second
-/// lag, an encoder), behind the limits of an actuator.
+/// Random plants that a design is simulated on: what no model has in it (friction, gravity, a
+/// second lag, an encoder), behind the limits of an actuator.
 #pragma once
 
 #include <algorithm>
@@ -311,9 +311,10 @@ class Pid {
     return pid;
   }
 
-  /// As the loops of identify/random_plant.hpp and identify/ordinary_log.hpp are tuned that logs
-  /// are recorded in, by somebody who knows b: bandwidth w of 0.1 to 0.28 over what u and y need,
-  /// integral of the pole for order 1; order 2 has 0.7 w^2 and 1.6 w, and here an integral, too.
+  /// Tuned by somebody who knows b, as the loops of identify/random_plant.hpp and
+  /// identify/ordinary_log.hpp are in which logs are recorded. Bandwidth w of 0.1 to 0.28 over what
+  /// u and y need, integral of the pole for order 1; order 2 has 0.7 w^2 and 1.6 w, and here an
+  /// integral, too.
   static Pid of_log(const Machine& m, Dice& dice) {
     Pid pid(m.order, m.T, m.lower(), m.upper());
     const double w = dice.between(0.1, 0.28) / (m.latency + m.T);

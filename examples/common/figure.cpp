@@ -15,9 +15,9 @@ namespace {
 std::string text_of(double value) { return number_text(value, 12); }
 std::string text_of(std::optional<double> value) { return value ? text_of(*value) : "*"; }
 
-/// Adds about `most` of the rows, so that the curve looks the same: of each part the lowest and the
-/// highest, so that noise keeps its envelope, those farthest left and right, and where a gap
-/// starts.
+/// Adds about `most` of the rows, so that the curve looks the same. Of each part it takes the
+/// lowest and the highest, so that noise keeps its envelope, those farthest left and right, and
+/// where a gap starts.
 void keep(std::set<std::size_t>& kept, const Curve& curve, const std::vector<std::size_t>& rows,
           std::size_t most) {
   const std::size_t parts = rows.size() <= most ? rows.size() : most / 4;

@@ -255,9 +255,9 @@ class TextLines {
 };
 
 /// The wanted columns of a CSV file. Lines that begin with # or % or // are comments. The numbers
-/// begin where a line looks like those further down; up to three lines directly above it name the
+/// begin where a line looks like those further down. Up to three lines directly above it name the
 /// columns (names, units), or the last comment, or a label before each number (u:1.5, "u: 1.5 V",
-/// u=1.5; other lines between them are left out). Columns are named by them, by what follows the
+/// u=1.5). Other lines between them are left out. Columns are named by them, by what follows the
 /// last / or . of a name or by its beginning where that is one column's alone, or by their number
 /// from 1 (@2: where a name is a number, too). Where the separator is no comma, a comma in a number
 /// is a decimal one. A number may have a unit behind it, ON and true are 1. What may be read in two

@@ -20,8 +20,9 @@
 // omega_c   controller         25          rad/s
 // omega_o   observer           150         rad/s; 220 from 3.2 s on
 //
-// Time line: steps of the reference at 0.1 s and 1.3 s, load step at 2.5 s, retune at 3.2 s, 10 %
-// of the samples lost from 3.6 s to 4.6 s with a gap of 40 ms at 4 s, 5 % NaN from 4.6 s to 5 s.
+// Time line: steps of the reference at 0.1 s and 1.3 s, load step at 2.5 s, retune at 3.2 s. 10 %
+// of the samples are lost from 3.6 s to 4.6 s with a gap of 40 ms at 4 s, 5 % NaN from 4.6 s to 5
+// s.
 
 #include <algorithm>
 #include <array>

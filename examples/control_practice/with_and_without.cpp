@@ -67,7 +67,7 @@ struct Without {
 struct Run {
   std::vector<double> t, angle, acts, found;
   double deviation = 0;    ///< largest |r - y| from the push on
-  double remaining = 0;    ///< |r - y| before the load begins to swing
+  double remaining = 0;    ///< |r - y| before the load begins to oscillate
   double found_after = 0;  ///< s from the push until dhat is within 5 % of it for good
 };
 

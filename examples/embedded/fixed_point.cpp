@@ -1,6 +1,6 @@
 // The same observer and the same controller in double, in float, and in the 32-bit integers that
 // to_fixed_c writes: how far the latter two are from the first, beside the bound that is promised.
-// The integers are those of the written C: the program plays its list of operations.
+// The integers are those of the written C: the program runs its list of operations.
 //
 // Way: sampled observers as deployed; the servo is a linear plant, sampled exactly.
 //

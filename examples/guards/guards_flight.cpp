@@ -1,5 +1,5 @@
-// A rate loop of a multirotor on its bad days: on the ground, with a b0 that follows the throttle,
-// with a disturbance beyond what the airframe may be given, with a mixer at its end; and the whole
+// A rate loop of a multirotor on bad days: on the ground, with a b0 that follows the throttle, with
+// a disturbance beyond what the airframe may be given, with a mixer at its end. Then the whole
 // flight controller axis of flight_controller.hpp on one flight.
 //
 // Way: sampled, the plant in steps of a tenth of a sample.

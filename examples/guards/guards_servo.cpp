@@ -1,6 +1,6 @@
 // A servo on its bad days: an observer that is given another u than the actuator got, settings that
-// forward Euler does not bear, a hard stop, a wrong sign and a b0 ten times too small that are
-// found and taken to the safe output; and how often they are found in a thousand servos.
+// forward Euler does not bear, a hard stop. A wrong sign and a b0 ten times too small are found and
+// taken to the safe output; how often, a thousand servos show.
 //
 // Way: sampled, the plant exactly (y'' = b u + d, held) but for stop and lag.
 //

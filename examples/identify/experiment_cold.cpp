@@ -1,6 +1,6 @@
 // From cold: does the experiment on the machine always end, with a name, within its limits?
 //
-// Way: sampled, as deployed; the machines in between in ten steps a sample. Drawn machines and
+// Way: sampled, as deployed; the machines in between in ten steps a sample. Random plants and
 // faults: --seed, --machines (healthy ones of each kind), --faulty (machines of each kind), --times
 // (at which each fault is drawn on each of them).
 //

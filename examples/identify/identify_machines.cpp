@@ -229,9 +229,9 @@ Log angle_log(const LogFile& file, bool gravity) {
   return log;
 }
 
-/// b0 by the energy of the weighed pendulum, without any filter or lag: what the reported torque
-/// should have done to v^2 / 2 + m g l / J (1 - cos y), less friction. @param friction a column for
-/// it; not where u follows the speed, then the two are one
+/// b0 by the energy of the weighed pendulum, without any filter or lag. It is what the reported
+/// torque should have done to v^2 / 2 + m g l / J (1 - cos y), less friction. @param friction a
+/// column for it; not where u follows the speed, then the two are one
 double b0_by_energy(const LogFile& file, std::size_t rows, bool friction) {
   constexpr double gravity = 20.04;  // m g l / J, weighed
   Eigen::MatrixXd columns(rows, friction ? 3 : 2);

@@ -8,6 +8,7 @@
 // y       with noise, in steps of an encoder, speed from counts, filtered, late, with an offset,
 //         with spikes
 // u       steps, few steps, PRBS, sines, ramps; PI controller (n = 1) or PD (n = 2) on steps
+//
 // Not ordinary: commands beyond a saturating actuator, a square valve, a dead zone, y before u, y
 // that has nothing to do with u, a reference that never moves, y an acceleration
 //

@@ -1,7 +1,7 @@
 /// @file
 /// Logs of ordinary machines as people record them, with their truth: heaters, tanks and motors
-/// under steps, ramps or a PI controller, servos; speed from counts, filtered or late, y with an
-/// offset, one direction with standstill, ambient that drifts, spikes.
+/// under steps, ramps or a PI controller, servos. They have speed from counts, filtered or late, y
+/// with an offset, one direction with standstill, ambient that drifts, spikes.
 #pragma once
 
 #include <algorithm>

@@ -37,8 +37,8 @@ struct RandomLog {
   std::vector<double> reference = {};  ///< of the loop, row by row
 };
 
-/// Of a log: as it is, with a flexible mode, with a reference that never moves, of a joint under
-/// gravity, which the model does not have, or from an encoder with rows that last 0.9 to 1.1 T and
+/// Of a log: as it is, with a flexible mode, with a reference that never moves, or of a joint under
+/// gravity, which the model does not have. Or from an encoder with rows that last 0.9 to 1.1 T and
 /// 3 % of them missing.
 enum class Kind { plain, flexible, unexcited, joint, jittery };
 

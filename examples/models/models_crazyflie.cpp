@@ -105,7 +105,7 @@ void axis(Report& report, const std::filesystem::path& file, bool pitch, std::ve
   const auto of_model = [](const auto& eso) {
     return eso.observer().model().constant(eso.estimate());
   };
-  // Where the loop itself swings most: u has its peak there in both axes.
+  // Where the loop itself oscillates most: u has its peak there in both axes.
   const auto swinging =
       Swinging::make({.observer = {.observer_bandwidth = observer,
                                    .input_gain = gain,

@@ -1,6 +1,6 @@
-// A geared DC servo that follows a sine (G. Keiel's log): what stands in the way comes back with
-// every period, friction above all, and a resonator at that frequency takes most of it out of the
-// disturbance that has to be found. The log is in examples/data.
+// A geared DC servo that follows a sine (G. Keiel's log). The disturbance repeats with every
+// period, friction above all. A resonator at that frequency takes most of it out of what has to be
+// found. The log is in examples/data.
 //
 // Way: sampled observers on a measured log, as it was logged.
 //
@@ -42,7 +42,7 @@ template <int Resonators>
 using Servo = DelayedInput<ModelEso<ModelParts{.order = 1, .resonators = Resonators}>, 2>;
 
 struct Found {
-  std::vector<double> total, rest;          ///< dhat, and what of it does not swing, deg/s
+  std::vector<double> total, rest;          ///< dhat, and what of it does not oscillate, deg/s
   double deviation = 0, left = 0, rms = 0;  ///< sd of the two; RMS of the innovation, deg
 };
 

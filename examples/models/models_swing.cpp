@@ -1,8 +1,10 @@
-// A drive whose cogging torque swings with its speed, and a plant with ripple of a known frequency:
-// the resonators in the model, their price, and what is left where the frequency is wrong.
+// A drive whose cogging torque oscillates with its speed, and a plant with ripple of a known
+// frequency: the resonators in the model, their price, and what is left where the frequency is
+// wrong.
 //
 // Way: sampled. The observer sees a double integrator on which the load acts; what dhat is off by
-// is what a law leaves of the load. The speed is known (that of the shaft) and is told each sample.
+// is what a law leaves of the load. The speed is known (that of the shaft) and is given each
+// sample.
 //
 // Load   d = a_1 sin(phi) + a_2 sin(2 phi + 1),  phi' = w(t)   (cogging)
 //

@@ -70,7 +70,7 @@ int main(int argc, char** argv) {
   auto settings = config(runs);
   constexpr std::int64_t drawn = 4000, few = 1000;
   Seen seen;
-  std::array<std::int64_t, numbers + 1> violated{};  // so many of the wishes at once
+  std::array<std::int64_t, numbers + 1> violated{};  // so many of the limits at once
   const std::array limits = {overshoot.options.limit, settling.options.limit, dip.options.limit,
                              chatter.options.limit};
   settings.on_run = [&](std::int64_t run, std::span<const double> number) {

@@ -6,8 +6,8 @@
 // applications under measurement noise", ISA Transactions 109 (2021) 1-10,
 // doi:10.1016/j.isatra.2020.09.007.
 //
-// Way: sampled. At t = k T the observer is updated with the sampled error and the input
-// that was held since (k - 1) T, the law is computed once, and its input is held for T; the plant
+// Way: sampled. At t = k T the observer is updated with the sampled error and the input held for
+// the last period. The law is computed once, and its input is held until the next sample. The plant
 // alone is integrated, RK4 at 0.1 ms.
 //
 // Plant, reference, law as in cascade_sim1.cpp. Observer: CascadeEso<2, p>, the exact

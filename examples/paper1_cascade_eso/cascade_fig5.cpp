@@ -8,8 +8,8 @@
 // Way: continuous simulation, plant and continuous observer as one ODE, Runge-Kutta of order 4 at 1
 // ms.
 //
-// The set-up is that of Sim1A and Sim1B (cascade_sim1.cpp). With J_p(omega_o1) = int |z3 error| dt
-// of the observer with p levels, the panels show
+// The set-up is that of Sim1A and Sim1B (cascade_sim1.cpp). J_p(omega_o1) = int |z3 error| dt is
+// that of the observer with p levels. The panels show
 //   J_2(y) - J_1(x),  J_3(y) - J_1(x),  J_3(y) - J_2(x)
 // over (x, y): red where the observer with more levels is worse, blue where it is better. A point
 // needs no run of its own: one curve J_p an observer gives all three maps.

@@ -227,7 +227,7 @@ PvtolCriteria run_pvtol(const PvtolSetup& setup, std::uint64_t seed = 0,
       series->estimate_error_x.push_back(d_error(0));
       series->estimate_error_z.push_back(d_error(1));
     }
-    // 100 m from the reference: it will not come back.
+    // 100 m from the reference: it will not recover.
     if (k == steps || !(e.norm() < 100.0)) break;
 
     const auto rate = [&](double time, const Stacked& state) -> Stacked {

@@ -1,5 +1,5 @@
 // The observer for any order n and any number m of extended states (our addition; the paper treats
-// n = 2, m = 1 and names the rest as future work): n = 1..4, m = 1..3 on polynomial disturbances,
+// n = 2, m = 1 and names the rest as future work). n = 1..4, m = 1..3 on polynomial disturbances,
 // beside the linear observer.
 //
 // J. Kasac, A. Pender, M. Pranjic, D. Kotarski, "Frequency-shifting-based algebraic approach to

@@ -1,7 +1,6 @@
 // The heater of heater_cold.hpp on the energy balance of a temperature lab: from cold to a loop
-// that knows its gain, lag and dead time; a fan that is not measured, measured, measured wrongly
-// and lost; and beside it a PI and a predictor of lag and dead time (Smith), tuned by the same
-// rule.
+// that knows its gain, lag and dead time. A fan is not measured, measured, measured wrongly and
+// lost. Beside it are a PI and a predictor of lag and dead time (Smith), tuned by the same rule.
 //
 // Plant    m c T' = U A (Ta - T) + eps sigma A (Ta^4 - T^4) + P u(t - 2 s); the fan doubles U
 //          m 0.004 kg, c 500, A 1.2e-3 m^2, U 5 W/(m^2 K), eps 0.9, P 0.64 W, Ta 23.5 degC
@@ -339,8 +338,8 @@ int main(int argc, char** argv) {
     const auto at = static_cast<std::size_t>(std::max(turn, 0.0));
     const double within = since - turn * period;
     const double fan = since > 0 && within >= pause ? 1 : 0;
-    // Told from the second time on; 30 % too little the third time, lost the fourth; at 40 degC the
-    // fifth.
+    // Known from the second time on; 30 % too little the third time, lost the fourth; at 40 degC
+    // the fifth.
     const auto now = [&](double then) { return since > 0 && std::abs(within - then) < T / 2; };
     if (now(pause)) load_before = heater.load();
     if (now(period - T) && at == 0) cooling = heater.cooling(load_before, heater.load(), wanted);

@@ -1,14 +1,14 @@
-// INDI or ADRC? One axis of a drone, four ways, all tuned by one rule: incremental dynamic
-// inversion with the rotor's speed measured and with a model of it, ADRC with the rotor's lag in
-// the model, and ADRC that is given nothing of it.
+// INDI or ADRC? One axis of a drone, four ways, all tuned by one rule. Two are incremental dynamic
+// inversion, with the rotor's speed measured and with a model of it; two are ADRC, with the rotor's
+// lag in the model and without it.
 //
 // Plant   y' = b v + d, tau v' = u - v; b = 600 rad/s^2, tau = 30 ms, T = 1 ms, abs(u) <= 1
 //         gyro noise 0.02 rad/s a sample; v: what the rotors do, from their measured speed
 // INDI    u = v_f + (nu - y'_f) / b, nu = omega_c (r - y), both filtered alike, at omega_f
 //
-// With y'_f = H (y[k] - y[k-1]) / T and v_f = H (mean of v over the sample) this is an observer of
-// order 1 that is given v as its input: dhat = H (y' - b v), and u = (nu - dhat) / b. The poles of
-// H are those of the observer's error. The program checks that sample by sample.
+// Let y'_f = H (y[k] - y[k-1]) / T and v_f = H (mean of v over the sample). Then this is an
+// observer of order 1 that is given v as its input: dhat = H (y' - b v), and u = (nu - dhat) / b.
+// The poles of H are those of the observer's error. The program checks that sample by sample.
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // The joint of joint.hpp on a simulated arm: a guessed inertia, a log of ten seconds under that
-// loop, the inertia that identify finds in it, the loop with it; and a motor wired the wrong way
+// loop, the inertia that identify finds in it, the loop with it. Then a motor wired the wrong way
 // round.
 //
 // Plant       J y'' = u - 0.05 y' - 0.4 tanh(y' / 0.02) - 1.5 sin y, J = 0.05 kg m^2

@@ -32,8 +32,8 @@ struct Residual {
 };
 [[nodiscard]] Residual residual_of(const Identified& found, const FitData& rows);
 
-/// What of them is periodic: the line of their spectrum that is highest above its neighbourhood, if
-/// it is higher than that of white noise is in all but one of as many logs as there are rows.
+/// What of them is periodic: the line of their spectrum that is highest above its neighbourhood. It
+/// must be higher than that of white noise is in all but one of as many logs as there are rows.
 [[nodiscard]] std::optional<double> line_of(const Residual& residual);
 
 }  // namespace esokit::examples::compiled

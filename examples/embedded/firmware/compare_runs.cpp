@@ -6,9 +6,8 @@
 // and images with fused multiply-adds, which round less often) may differ by a share of the largest
 // magnitude that the quantity has in the run:
 // - 2e-3. A rounding of y near 1 rad, 6e-8, is 1/1700 of the sensor's noise, and the noise moves no
-//   estimate by more than its largest value; so 1/1700 and some for what comes back through the
-//   loop.
-// - 5e-2 for the adjustable bandwidth under a closed loop: it compares the magnitudes of two
+//   estimate by more than its largest value. So 1/1700, and some for what returns through the loop.
+// - 5e-2 for the adjustable bandwidth under a closed loop. It compares the magnitudes of two
 //   innovations, so one rounding may choose the other gain for a sample; the two estimates then
 //   differ by what the noise does.
 //

@@ -208,8 +208,8 @@ requires(detail::goes_into_a_loop<Observer>()) class Adapter
 /// Base of the adapters with a config: `make`, `retune`, `adopt`, and members that most adapters
 /// forward. An adapter has `check(config)`, which returns a Check, a constructor from `(observer,
 /// config)`, and `take(fresh)`, which takes over its own settings once the observer has taken over
-/// its own; or, if they may be refused, `take(fresh, before)`, which returns a Check and is called
-/// of a copy. `before` is the adapter with all its old settings.
+/// its own. If they may be refused, it is `take(fresh, before)`, which returns a Check and is
+/// called of a copy. `before` is the adapter with all its old settings.
 /// @tparam Self the adapter @tparam Settings its Config
 template <class Self, LoopObserver Observer, class Settings>
 class NamedAdapter : public Adapter<Observer> {

@@ -22,8 +22,8 @@ requires(detail::goes_into_a_loop<Observer>()) struct DelayedInputConfig {
   int delay = 0;                                               ///< d, samples, 0 .. Capacity
 };
 
-/// Passes u[k-d] instead of u[k] to the observer (for a delay of d sample times by bus, drive or
-/// computation), so that the observer sees each y with the u that caused it, and the delay does not
+/// Passes u[k-d] instead of u[k] to the observer, for a delay of d sample times by bus, drive or
+/// computation. So the observer sees each y with the u that caused it, and the delay does not
 /// appear as a disturbance.
 ///
 /// The estimate is for the present sample; the effect of inputs that are still in the delay line is

@@ -33,7 +33,7 @@ requires(detail::goes_into_a_loop<Observer>()) struct GuardedConfig {
 ///   are corrected as usual.
 /// - Held: something else (the ground, a brake) keeps the plant at a standstill, so the measurement
 ///   contains no information about d. Between `hold(u)` and `release()` the estimate is (y, 0, ..,
-///   0, dhat) with the y that is measured and the dhat of before, whatever u is; a hold without any
+///   0, dhat) with the y that is measured and the dhat of before, whatever u is. A hold without any
 ///   measurement is completed by the first one after it. `hold` returns the u to give to the
 ///   observer, on the chain the one that makes y^(n) zero. `Adrc::hold` does this for one sample;
 ///   on release start the reference at y. A plant that moves while its output is off needs no hold:
@@ -72,12 +72,12 @@ requires(detail::goes_into_a_loop<Observer>()) struct GuardedConfig {
 /// sample. With m = 1 the bound does the same, as long as the true d is within it. What is proven
 /// of this, level by level:
 /// - By the circle criterion errors stay bounded, and decay once the trust returns, if Re G > -1 on
-///   the unit circle, where G is the transfer function from the correction of dhat to its
-///   innovation. `make` checks this, including the leak. Poles in one place pass at any bandwidth
-///   (tested up to n = 5, omega_o T = 20): min Re G is -1/4 (n = 1), -1/3 (n = 2), -3/8 (n = 3) for
-///   fast sampling, and never below -1/2. Known poles and an actuator do not change it; a sensor
-///   has an effect like up to one more order per lag. A sine that is captured too fast for its
-///   frequency is refused (20 rad/s at omega_o = 100: `capture_bandwidth` 20 fails, 4 passes).
+///   the unit circle. G is the transfer function from the correction of dhat to its innovation.
+///   `make` checks this, including the leak. Poles in one place pass at any bandwidth (tested up to
+///   n = 5, omega_o T = 20). For them min Re G is -1/4 (n = 1), -1/3 (n = 2), -3/8 (n = 3) for fast
+///   sampling, and never below -1/2. Known poles and an actuator do not change it; a sensor has an
+///   effect like up to one more order per lag. A sine that is captured too fast for its frequency
+///   is refused (20 rad/s at omega_o = 100: `capture_bandwidth` 20 fails, 4 passes).
 /// - At each hold the error of dhat is at most that at the hold before, whatever phi was between
 ///   them: `make` checks this, too (gain/gating_certificate.hpp). Poles in one place pass as they
 ///   are up to omega_o T = 1 at least. For other gains, with slow sines for example, the first

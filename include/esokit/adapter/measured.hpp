@@ -23,9 +23,9 @@ requires(detail::goes_into_a_loop<Observer>()) struct MeasuredConfig {
                        ///< 65535; after them it counts as zero, until there is a good one
 };
 
-/// Observer of y^(n) = f(w) + d + b0 u with disturbances w that are measured (a fan, a flow, the
-/// supply voltage, the torque of the next joint) and whose effect f is known, see MeasuredInput.
-/// The estimate is that of f + d, so a law cancels both, f without waiting for y.
+/// Observer of y^(n) = f(w) + d + b0 u with measured disturbances w whose effect f is known, see
+/// MeasuredInput: a fan, a flow, the supply voltage, the torque of the next joint. The estimate is
+/// that of f + d, so a law cancels both, f without waiting for y.
 ///
 /// Timing: `measured(w)` at sample k comes before `update(y, u)`; w[k] is taken to be held from k
 /// to k + 1, like the u that a controller returns at k. So dhat has f of the coming sample, and
@@ -39,7 +39,7 @@ requires(detail::goes_into_a_loop<Observer>()) struct MeasuredConfig {
 /// does not explain.
 ///
 /// A w that is not given before a step, is not finite, or is too large is lost: the last good one
-/// is held for `most_lost` samples, then dropped: it counts as zero, which passes lag and dead
+/// is held for `most_lost` samples, then dropped. It then counts as zero, which passes lag and dead
 /// time like any w. The first good w ends this. `lost(i)` and `dropped(i)` tell. Where the real w
 /// does not go to zero then, d steps by what it does, and an OutlierGate may reject y for a while.
 ///

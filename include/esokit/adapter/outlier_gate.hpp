@@ -26,7 +26,7 @@ requires(detail::goes_into_a_loop<Observer>()) struct OutlierGateConfig {
 /// correction uses the gain for the gap. Without a gate a single y of 1e30 spoils the estimate of a
 /// linear observer for ln 1e30 / (omega_o T) samples.
 ///
-/// A measurement is accepted if abs(y - z_1) <= M max(threshold, running_factor m), where m is the
+/// A measurement is accepted if abs(y - z_1) <= M max(threshold, running_factor m). Here m is the
 /// running mean of abs(y - z_1) over about 64 measurements and M the number of sample times since
 /// the last correction (D if only every D-th sample has a measurement). The gate never stays shut:
 /// after `most_in_a_row` rejected measurements it opens and accepts everything until as many in a

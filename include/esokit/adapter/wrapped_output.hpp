@@ -29,7 +29,7 @@ requires(detail::goes_into_a_loop<Observer>()) struct WrappedOutputConfig {
 /// Turns are counted from one measurement to the next, not from the prediction. So the observer
 /// sees an angle without jumps: every omega_o T is allowed, and the true angle is the only
 /// equilibrium. (If the innovation is taken modulo one period, as is often done, every y' + k
-/// period / T is an equilibrium: after one bad sample an axis at rest may be estimated as spinning
+/// period / T is an equilibrium. After one bad sample an axis at rest may be estimated as spinning
 /// forever.)
 ///
 /// Requirements on y, including its noise:
@@ -39,7 +39,7 @@ requires(detail::goes_into_a_loop<Observer>()) struct WrappedOutputConfig {
 ///   during a gap the average is assumed to continue.
 ///
 /// A measurement that violates the second requirement is placed in the turn nearest to the
-/// prediction and reported as `turn_assumed`, so that an outlier does not change the turn; after
+/// prediction and reported as `turn_assumed`, so that an outlier does not change the turn. After
 /// three in a row, turns are counted again. Once y meets the requirements, turns are correct from
 /// the 30th measurement on, whatever happened before, and the observer converges as without turns.
 ///

@@ -231,9 +231,9 @@ struct SwitchedBandwidth {
 };
 
 /// Bound and convergence time for the adjustable-bandwidth ESO under any switching: S. Zhang, X.
-/// Qi, S. Yang, J. Systems Engineering and Electronics (2023), (15), (20), (21), with a P common to
-/// both modes that is computed from the inequalities, and delta-bar = norm of the larger gain (in
-/// (13) the square root is missing).
+/// Qi, S. Yang, J. Systems Engineering and Electronics (2023), (15), (20), (21). The P common to
+/// both modes is computed from the inequalities, and delta-bar = norm of the larger gain (in (13)
+/// the square root is missing).
 /// @tparam Size N @return error for a bad setting, or factors without a common P
 template <int Size>
 Expected<ErrorBound<Size>, Error<double>> switched_error_bound(const SwitchedBandwidth& setting,
@@ -255,8 +255,8 @@ struct GainRange {
 };
 
 /// Bound for the nonlinear higher-order ESO: A. T. Azar et al., Mathematics 10 (2022) 2261, (34),
-/// (35), under assumptions that the paper omits: k(e) stays within (k_min, k_max), and both limits
-/// share a P. The bound then covers any variation of k between them.
+/// (35). It assumes what the paper omits: k(e) stays within (k_min, k_max), and both limits share a
+/// P. The bound then covers any variation of k between them.
 /// @tparam Size N @return error for a bad setting, or a range without a common P
 template <int Size>
 Expected<ErrorBound<Size>, Error<double>> nonlinear_error_bound(const GainRange& setting,

@@ -30,8 +30,8 @@ struct LoopGain {
 LoopGain loop_gain_of(const Loop& loop, int channel);
 
 /// The frequency range in which a loop gain is examined: from well below its slowest pole to pi / T
-/// or well above its fastest pole; with the frequencies of all poles, near which it may change
-/// fast.
+/// or well above its fastest pole. It has the frequencies of all poles, near which the gain may
+/// change fast.
 struct ScanRange {
   std::vector<double> features;  ///< rad/s, rising
   double from = 0.0;

@@ -142,8 +142,8 @@ Expected<Margins, Error<double>> margins(const LinearPlant<States, S, Inputs, Ou
 /// Range of b0 for which the loop with this plant is stable while the rest of the design stays the
 /// same; an end is infinite if there is no limit.
 ///
-/// The loop gain depends only on b / b0, where b is the plant's: divided by b this is the range of
-/// b0 / b, and the gain of the plant may be multiplied by b0 / upper .. b0 / lower.
+/// The loop gain depends only on b / b0, where b is the plant's. Divided by b this is the range of
+/// b0 / b; the gain of the plant may be multiplied by b0 / upper .. b0 / lower.
 /// @return error for a nominal loop that is not stable, and a controller whose u is not
 ///         proportional to 1 / b0 (a compensator, several channels)
 Expected<Interval<>, Error<double>> input_gain_range(const Loop& loop);
@@ -157,10 +157,10 @@ Expected<Interval<>, Error<double>> input_gain_range(const LinearPlant<States, S
   return input_gain_range(*loop);
 }
 
-/// The factor f > 1 such that the loop is stable while the loop gain at this actuator, and with it
-/// b / b0, varies arbitrarily from sample to sample between 1/f and f times its nominal value
-/// (circle criterion: f + 1/f < (1 + abs(L)^2) / -Re L at all frequencies). The bound is
-/// sufficient, not necessary. Lag, delay and sensor are included if they are part of the plant.
+/// The factor f > 1 such that the loop is stable while the loop gain at this actuator (and so b /
+/// b0) varies arbitrarily between samples, by 1/f to f times its nominal value. Circle criterion: f
+/// + 1/f < (1 + abs(L)^2) / -Re L at all frequencies. The bound is sufficient, not necessary. Lag,
+/// delay and sensor are included if they are part of the plant.
 /// @return the factor and the frequency that limits it; infinity if Re L is never negative; error
 /// for a nominal loop that is not stable, or if there is no such channel
 Expected<Margin, Error<double>> gain_variation(const Loop& loop, int channel = 0);

@@ -176,9 +176,9 @@ struct ObserverSizes {
   int size, levels;
 };
 
-/// The parts of a sampled observer, in physical units: Phi - I, Gamma, the part of a correction
-/// that belongs to the disturbance (for several levels), the gains k level by level, and the place
-/// of each row of the estimate among the states.
+/// The parts of a sampled observer, in physical units: Phi - I, Gamma, the gains k level by level,
+/// and the place of each row of the estimate among the states. For several levels also the part of
+/// a correction that belongs to the disturbance.
 struct ObserverParts {
   DenseView<const double> step, gamma, disturbance;
   const double* gains;

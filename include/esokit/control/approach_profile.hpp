@@ -33,8 +33,8 @@ requires(detail::is_a_plain_scalar<S>()) struct ApproachProfileConfig {
 ///     y' = -a y + b0 v(t - L) + d,   tau v' + v = u,
 ///
 /// from any state to any target, which may change at each sample: `update(target)` once a sample,
-/// then `motion()` is what the law gets, (r, r') or with the actuator's lag (r, r', r''), and
-/// `feed()` the u that the machine needs for it beside the law:
+/// then `motion()` is what the law gets, (r, r') or with the actuator's lag (r, r', r''). `feed()`
+/// is the u that the machine needs for it beside the law:
 ///
 ///     controller.applied(u - fed);                     // u as it was held, without the part added
 ///     u = controller.update(y, profile.motion()) + profile.feed();  // then within the limits

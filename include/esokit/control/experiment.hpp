@@ -15,41 +15,41 @@ namespace esokit {
 /// Moves a machine around an operating point with a relay or with steps, stops by itself, and
 /// computes b0 and latency. Call `update` at each sample, like a controller.
 ///
-/// Method: over every two cycles, the complex sums of the n-th differences of y and of u, weighted
-/// with the window w = 1 - cos(theta) (theta: 0 to 2 pi over the window) and the harmonics 1 and 3
-/// of the cycle:
+/// Method: over every two cycles, the complex sums of the n-th differences of y and of u. They are
+/// weighted with the window w = 1 - cos(theta) (theta: 0 to 2 pi over the window) and the harmonics
+/// 1 and 3 of the cycle:
 ///
 ///     H_m = sum w e^(-j m 2 theta) D^n y / (T^n sum w e^(-j m 2 theta) u),   m = 1, 3
 ///
 /// Because w and its slope are zero at both ends and a constant d does not contribute, H is b0
-/// e^(-j w L) / (1 + j w tau) at the angular frequency w of the harmonic, whatever the machine does
-/// before and after; no describing function is needed. abs(H_3 / H_1) separates lag from dead time,
-/// the angle of H_3 shows how wrong this model of the machine is, and the scatter of the H shows
-/// the effect of noise. All three contribute to the interval. Damping a y (n = 1) and Coulomb
-/// friction (n = 2) turn H_1 and H_3 by different angles; from this they are estimated and
-/// corrected for, or refused if too large. Two effects are not modelled: damping with n = 2, which
-/// looks like less latency, and a d that rises steadily by r per second, which shifts H by r P /
-/// (12 A), where P is the period of a cycle. `identify` can separate them from the log.
+/// e^(-j w L) / (1 + j w tau). Here w is the angular frequency of the harmonic; what the machine
+/// does before and after does not matter. No describing function is needed. abs(H_3 / H_1)
+/// separates lag from dead time, the angle of H_3 shows how wrong this model of the machine is, and
+/// the scatter of the H shows the effect of noise. All three contribute to the interval. Damping a
+/// y (n = 1) and Coulomb friction (n = 2) turn H_1 and H_3 by different angles; from this they are
+/// estimated and corrected for, or refused if too large. Two effects are not modelled. Damping with
+/// n = 2 looks like less latency. A d that rises steadily by r per second shifts H by r P / (12 A),
+/// where P is the period of a cycle. `identify` can separate them from the log.
 ///
 /// On a machine of order 2 without damping a relay does not reach a stable cycle without `lead`.
 /// With it, the relay switches on y + 3 (y - f), where f is y behind a lag of a quarter of `lead`.
 ///
 /// From cold (order 1, `approach`): after `rest` u is the approach's until y, as it rises, will
 /// reach `output` within the time that its first `response` took. There the relay switches between
-/// u0 and the approach's u; the mean of u over a whole cycle is the u that holds `output`, and the
+/// u0 and the approach's u. The mean of u over a whole cycle is the u that holds `output`, and the
 /// measured cycles move u around that, with a hysteresis of at least what y moves in the latency.
 ///
 /// Limits are those of y, of y' (`fastest`), of u and of time. Whatever happens ends within
 /// `time_limit` with a `reason`, and with the safe u. Where u drives y further than the safe u does
-/// (with safe u = u0 on both sides), y has to follow it by `response` in each `response_time`: so a
+/// (with safe u = u0 on both sides), y has to follow it by `response` in each `response_time`. So a
 /// sensor that stands still is noticed within that time, in which u may move y by b0 A times it:
 /// leave as much room. On a side where the safe u leads as far or further, only `time_limit` ends
-/// it; during approach and centring on the side that is nearer to the safe u. No u
-/// stops a machine of order 2 in its motion, nor holds one that was turned on by something else:
-/// that is for brakes and end stops.
+/// it; during approach and centring on the side that is nearer to the safe u. No u stops a machine
+/// of order 2 in its motion, nor holds one that was turned on by something else: that is for brakes
+/// and end stops.
 ///
-/// Hand-over: from phase `hand_over` on the result is ready. Make the controller, call its
-/// `track(y, reference, u)` while the experiment still moves the machine, and continue with its
+/// Hand-over: from phase `hand_over` on the result is ready. Make the controller and call its
+/// `track(y, reference, u)` while the experiment still moves the machine. Continue with its
 /// `update` from phase `done` on, before the first of them `applied(u)` with the u that the
 /// experiment gave last. `examples/identify` shows this.
 /// @tparam Order n, 1 or 2

@@ -166,23 +166,23 @@ requires(model_traits<Model>.tells_constant) inline constexpr int simulated_lag<
 /// to 0: so a small rho alone proves nothing. Nor does a negative one: u reacts to a load late, and
 /// lags, friction and noise add to that, so that a load step on a healthy loop makes rho negative
 /// for a while. A sample counts if abs(phi) is above 2 % of b0 times the input range and above the
-/// noise of dhat, its measurement is good, the law determines u and no guard gates or bounds dhat.
-/// The sums forget with the time constant `memory`.
+/// noise of dhat. Its measurement must be good, the law determine u, and no guard gate or bound
+/// dhat. The sums forget with the time constant `memory`.
 ///
 /// Two rules for the sign therefore ask for more. Where u comes from a loop, a wrong sign drives it
 /// to a limit, where it stays. `opposed` is the time for which both phi and phi delayed by
 /// 3 / omega_o are beyond 0.9 of the way to a limit, and y^(n) = phi + dhat has the other sign. A
 /// load, or a machine that falls back to its own rest (dhat contains -a y), does the same to a
 /// healthy loop. So u must also have been seen to move y the wrong way: `sign_ratio`, which is rho
-/// from moves beyond 0.3 of the range of u (0.2 for order 2 and above), is below -0.25, and unless
-/// it is below -0.5, y^(n) is against u by 0.3 of what it says. Only a load that jumps by as much
+/// from moves beyond 0.3 of the range of u (0.2 for order 2 and above), is below -0.25. Unless it
+/// is below -0.5, also y^(n) is against u by 0.3 of what it says. Only a load that jumps by as much
 /// as u at the same time fakes that. Where u moved less, y^(n) has to stay against it for long
 /// without falling (`steady`), which a machine on its way to its rest does not do. A detached
 /// actuator has a rho of zero; under loads of half its range one of ten is named. If u is not at a
 /// limit, for example in manual operation, rho has to be below -0.5 for long. (Where dhat is at its
 /// bound, the sign of the innovation stands for that of y^(n), and any negative rho counts.) A
-/// machine that runs into a stop before both are true is not found, and one that bounces between
-/// stops may be named wrongly.
+/// machine that runs into a stop before both are true is not found. One that bounces between stops
+/// may be named wrongly.
 ///
 /// Once found, a wrong sign stays (`reversed`): after the runaway u stands at a limit and proves
 /// nothing more. The way out is `clear`, or u that moves y the right way: sign_ratio above
@@ -350,7 +350,7 @@ requires(detail::is_a_plain_scalar<S>()) class HealthMonitor {
     health_.innovation_of_noise = of_noise;
   }
 
-  /// Computes the rms of innovation and dhat for white noise in y from the impulse responses: the
+  /// Computes the rms of innovation and dhat for white noise in y from the impulse responses. The
   /// innovation passes ((z-1)/(z-r))^N; for dhat n of the N differences are divided by T, and there
   /// is one more pole.
   void noise_of_noise(const Config& config, S r) noexcept {

@@ -22,7 +22,7 @@ struct Limits {
 /// The bounds of the next step are computed in advance from the last output, so that only a minimum
 /// and a maximum are left between command and output.
 ///
-/// A step of rate x T that the digits of u cannot hold waits until it has become large enough, so
+/// A step of rate x T that the digits of u cannot hold waits until it has become large enough. So
 /// the rate holds at any magnitude; it may be exceeded by one digit of u. Where a step is above
 /// 1024 digits of the larger magnitude limit nothing can be lost, and nothing is added to the work.
 ///
@@ -131,8 +131,8 @@ class Limiter {
     }
   }
 
-  /// The same for a caller that says in `applied` what was said before. @param told whether
-  /// `applied` was said since the last output
+  /// The same for a caller that says in `applied` what was said before. @param told `applied` was
+  /// said since the last output
   [[nodiscard]] constexpr const S& commanded(bool told) const noexcept {
     return told ? commanded_ : held_;
   }

@@ -1,7 +1,7 @@
 /// @file
 /// PredictiveAdrc (PADRC, and EPADRC with the extended state filter): ADRC in two phases, with
-/// almost no computation between the measurement and u (S. Shi, Z. Zeng, C. Zhao, L. Guo, P. Chen,
-/// Energies 15 (2022) 5799, (26), (51)-(53) corrected).
+/// almost no computation between the measurement and u. S. Shi, Z. Zeng, C. Zhao, L. Guo, P. Chen,
+/// Energies 15 (2022) 5799, (26), (51)-(53) corrected.
 #pragma once
 
 #include <cmath>

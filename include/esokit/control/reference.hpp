@@ -20,8 +20,8 @@ consteval bool is_a_reference() {
 }
 }  // namespace detail
 
-/// (r, r', .., r^(n)), made from a number if r is constant, or from up to n + 1 elements, as a list
-/// `{r, r1}` or as a vector (of Eigen, too), if it moves; the others are zero. A tracking
+/// (r, r', .., r^(n)), made from a number if r is constant. If it moves, from up to n + 1 elements,
+/// as a list `{r, r1}` or as a vector (of Eigen, too); the others are zero. A tracking
 /// differentiator or a profile gives such a vector.
 /// @tparam Order n
 template <int Order, Scalar S = double>

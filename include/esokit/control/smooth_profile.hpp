@@ -17,8 +17,8 @@
 namespace esokit {
 
 /// The polynomial of least degree that goes from 0 to 1 with n derivatives zero at both ends, and
-/// these derivatives (for n = 2 the quintic; L. Biagiotti, C. Melchiorri, Trajectory Planning for
-/// Automatic Machines and Robots, Springer 2008, section 2.1):
+/// these derivatives (for n = 2 the quintic). L. Biagiotti, C. Melchiorri, Trajectory Planning for
+/// Automatic Machines and Robots, Springer 2008, section 2.1:
 ///
 ///     s(x) = sum_k (-1)^k C(n + k, k) C(2n + 1, n - k) x^(n + 1 + k),  k = 0 .. n
 ///

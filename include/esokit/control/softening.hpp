@@ -1,8 +1,8 @@
 /// @file
 /// Softening: lower gains while the law asks for more than the actuator can give, so that the loop
-/// recovers from an overload (scheduled low gain: A. Megretski, L2 BIBO output feedback
+/// recovers from an overload. Scheduled low gain: A. Megretski, L2 BIBO output feedback
 /// stabilization with saturated control, IFAC World Congress 1996; Z. Lin, Low Gain Feedback,
-/// Springer 1998).
+/// Springer 1998.
 #pragma once
 
 #include <cmath>
@@ -22,8 +22,8 @@ namespace esokit {
 ///
 /// A law for the bandwidth s omega, and well damped: stable with any latency if s is small enough.
 /// While abs(u - middle) > 1.1 half the range, 1 / s grows by omega T a sample, else it shrinks by
-/// 0.1 omega T down to 1: ds/dt = -omega s^2, or 0.1 omega s^2. So the law slows down at its own
-/// speed, and speeds up too slowly to oscillate again.
+/// 0.1 omega T down to 1. That is ds/dt = -omega s^2, or 0.1 omega s^2. So the law slows down at
+/// its own speed, and speeds up too slowly to oscillate again.
 template <int Order, Scalar S = double>
 class Softening {
  public:

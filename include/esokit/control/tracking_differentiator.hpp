@@ -10,7 +10,7 @@
 
 namespace esokit {
 
-/// Han's time-optimal control of a double integrator sampled with h, fhan(x1, x2, r, h0): brings
+/// Han's time-optimal control of a double integrator sampled with h, fhan(x1, x2, r, h0). It brings
 /// (x1, x2) to zero in the smallest number of steps with a result of at most r in magnitude,
 /// without chatter.
 /// @param x1 distance @param x2 its derivative @param acceleration r > 0

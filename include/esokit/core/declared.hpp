@@ -3,7 +3,7 @@
 /// declares.
 ///
 /// A type declares what it can do in a static constant `traits`; without it the defaults apply. A
-/// member is never called only because it has the name of a hook (an optional member function): a
+/// member is never called only because it has the name of a hook (an optional member function). A
 /// member with such a name that is not declared is a mistake, and so is a declared hook that is
 /// missing.
 #pragma once

@@ -3,7 +3,7 @@
 /// ones and put together again. `Packed` (core/packed.hpp) is such an object for any type.
 ///
 /// In normal operation an observer of packs computes with packs. If one lane has a bad sample, a
-/// gap or a restart, each lane goes through the observer of the plain scalar: so fault handling is
+/// gap or a restart, each lane goes through the observer of the plain scalar. So fault handling is
 /// written once, and each lane behaves exactly like a plain observer.
 #pragma once
 

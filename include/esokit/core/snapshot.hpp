@@ -17,7 +17,7 @@
 namespace esokit {
 
 /// Settings and state of a T: the memory of a T, then a checksum. Valid only for the same version
-/// of the library and for targets with the same memory layout of T. That the size is the same is
+/// of the library and for targets with the same layout of T in memory. That the size is the same is
 /// checked at compile time, that the members have the same sizes is not. x86-64, ARM and RISC-V
 /// have the same layout for the float types of the library.
 template <class T>

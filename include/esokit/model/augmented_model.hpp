@@ -25,16 +25,16 @@ namespace esokit {
 ///     sensor     the measured value follows y by a lag
 ///     d          a constant (or polynomial), sines, and parts that decay exponentially
 ///
-/// With an actuator, model and law have the order of plant and actuator together: y^(n+1) = D + b u
-/// with b = b0 / tau for a lag of first order, y^(n+2) = D + b u with b = b0 w^2 for one of second
-/// order. `estimate` is (y, .., y^(order-1), D, ..), where D is everything that a law cancels, so
+/// With an actuator, model and law have the order of plant and actuator together. A lag of first
+/// order gives y^(n+1) = D + b u with b = b0 / tau, one of second order y^(n+2) = D + b u with b =
+/// b0 w^2. `estimate` is (y, .., y^(order-1), D, ..), where D is everything that a law cancels, so
 /// that any law works with it and omega_c keeps its meaning. After D come d', .. if there is more
 /// than one integrator, each sine q followed by q' / w, the first-order disturbances, and with a
 /// sensor the measured value (for order 2 also its derivative / w).
 ///
-/// Poles: the actuator is simulated from u alone and never corrected, so it keeps its own poles; a
-/// sensor that is faster than omega_o also keeps its own; those of a sine go to -s +- j w0; all
-/// others to exp(-omega_o T).
+/// Poles: the actuator is simulated from u alone and never corrected, so it keeps its own. A sensor
+/// that is faster than omega_o also keeps its own, those of a sine go to -s +- j w0, all others to
+/// exp(-omega_o T).
 template <ModelParts Parts, Scalar S = double>
 class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   using Base = MatrixModel<detail::PartsShape<Parts>, S>;

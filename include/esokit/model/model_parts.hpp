@@ -140,8 +140,8 @@ void set_sinusoid_rates(Matrix<S, Rows, Columns>& a, int first,
 }
 
 /// The sensor's states f as a function of those of the plant, f = g x, if the sensor keeps its own
-/// poles: g solves g A + rate g = rate C (order 1); for order 2 the second row is f' / w. The first
-/// state of x is y.
+/// poles. For order 1 g solves g A + rate g = rate C; for order 2 the second row is f' / w. The
+/// first state of x is y.
 /// @param rates T A of the plant
 template <int Order, PlainScalar S, int Size>
 Matrix<S, Order, Size> shown_by_sensor(const Lag<Order, S>& sensor, const S& time,

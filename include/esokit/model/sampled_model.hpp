@@ -70,7 +70,7 @@ struct NoModelSettings {};
 /// - `state_of_row(r)`: place of row r of the estimate among the states; state 0 is the measured
 ///   value (row 0, unless there is a sensor's lag)
 /// - `increment()`: Phi - I, N x N, for the design; `degree(r)`: the power of T in the scaling of
-///   state r (if all poles are within a of z = 1, the design scales state r by a^degree(r))
+///   state r. If all poles are within a of z = 1, the design scales state r by a^degree(r)
 template <class Model, class S>
 concept SampledModel = std::copyable<Model> && DeclaresTraits<Model, ModelTraits> &&
     requires(const Model& model, const S& s, const typename Model::State& x,

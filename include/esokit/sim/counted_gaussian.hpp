@@ -157,7 +157,7 @@ enum class RandomStream : std::uint64_t {
 };
 
 /// The random numbers of a run, or of the runs in the lanes of a pack. Each call gives one number
-/// for each lane; lane i has the numbers of run `run` + i for any number of lanes (bit for bit with
+/// for each lane. Lane i has the numbers of run `run` + i for any number of lanes (bit for bit with
 /// -ffp-contract=off: the compiler must not fuse products and sums). Number k is a function of
 /// (seed, stream, run, k) only.
 ///

@@ -1,7 +1,7 @@
 /// @file
 /// Constant, step and sine with exact derivatives.
 ///
-/// A signal that begins at `time` is active for t >= time, without tolerance: on a grid t = k h, a
+/// A signal that begins at `time` is active for t >= time, without tolerance. On a grid t = k h, a
 /// start computed as k0 h is active at sample k0; one written as a decimal number may be active one
 /// sample later.
 #pragma once

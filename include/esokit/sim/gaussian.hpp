@@ -10,9 +10,10 @@
 namespace esokit::sim {
 
 /// Normal random numbers with mean 0 and variance 1. std::mt19937_64 is specified to the bit,
-/// std::normal_distribution is not, so the numbers are computed here by Marsaglia's polar method:
-/// pairs (2 U - 1, 2 U - 1), U from the upper 53 bits, until a pair lies within the unit circle;
-/// the first of the pair is returned first. Only the last digits of `log` depend on the platform.
+/// std::normal_distribution is not, so the numbers are computed here by Marsaglia's polar method.
+/// It draws pairs (2 U - 1, 2 U - 1), U from the upper 53 bits, until a pair lies within the unit
+/// circle; the first of the pair is returned first. Only the last digits of `log` depend on the
+/// platform.
 ///
 /// Always computed in double, so that a float simulation gets the same noise.
 class Gaussian {

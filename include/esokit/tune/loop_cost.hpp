@@ -7,15 +7,15 @@
 ///
 /// is computed as an integral over the frequency, which gives the same as a Lyapunov equation. This
 /// way the plant with its dead time is evaluated only once for all controllers, and the same loop
-/// gains give the margins. (d is a random walk, so the variance of u is infinite, but that of u~ is
-/// not.) The grid is even in the logarithm of W = 2 / T tan(omega T / 2), on which the trapezoid
-/// rule converges exponentially: with poles of damping 0.25 the error is 1e-6 at 20 points per
+/// gains give the margins. d is a random walk, so the variance of u is infinite, but that of u~ is
+/// not. The grid is even in the logarithm of W = 2 / T tan(omega T / 2), on which the trapezoid
+/// rule converges exponentially. With poles of damping 0.25 the error is 1e-6 at 20 points per
 /// decade. Its steps grow towards half the sample rate, where W is infinite, so that it sees poles
 /// near z = -1. Poles of little damping hide between its points: `exact_deviations` solves the
 /// Lyapunov equations. A loop is stable if the phase of its characteristic polynomial turns by half
 /// a turn for each state between z = 1 and z = -1.
 ///
-/// A latency that is wrong by part of a sample is more than a phase: near half the sample rate a
+/// A latency that is wrong by part of a sample is more than a phase. Near half the sample rate a
 /// sampled plant of one dead time can have next to no gain, and that of half a sample more a lot.
 /// So margins over latencies follow the sampled plant from one end of the interval to the other,
 /// and where that is a sample or more, take what any dead time can make of it.

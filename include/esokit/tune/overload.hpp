@@ -74,7 +74,7 @@ std::vector<Overload> overloads_of(const TuneModel& variant);
 
 /// Order 3: whether friction, however small, makes the loop oscillate for ever. On a motion of y'
 /// of amplitude A friction f acts as a damping 4 f / (pi A) (describing function), so the loop has
-/// to be stable with any: searched for from 1 / 100 to 3000 per TuneModel::latency.
+/// to be stable with any. Searched from 1 / 100 to 3000 per TuneModel::latency.
 bool oscillates_with_friction(const TuneModel& model, const LinearController& controller);
 
 namespace detail {
@@ -124,8 +124,8 @@ double overload_distance(const TuneModel& model, double gain, const Overload& ev
 
 /// Simulates one event from rest, with u about the middle of its range and the noise of the model.
 /// Back is: y within 2 % of its peak and four deviations of the noise, and u mostly off its limits,
-/// for a settling time; this within 25 times the length of the event and 10 settling times. With
-/// friction for two settling times, within 10.
+/// for a settling time. It has to be so within 25 times the length of the event and 10 settling
+/// times. With friction for two settling times, within 10.
 /// @param gain factor on b0 of the plant, not of the controller
 /// @param settling_time of the linear loop, s
 /// @param on_sample called as on_sample(t, r, y, u) once a sample

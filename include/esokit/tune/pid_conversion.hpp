@@ -79,11 +79,11 @@ Expected<PidGains<S>, Error<S>> pid_from_adrc(const AdrcTuning<S>& tuning) {
 /// The ADRC that has the given PID gains (its filter may differ).
 ///
 /// PI: any `bandwidth_ratio` kappa = omega_o / omega_c is possible, so the given one is used. PID:
-/// kappa follows from K_p^2 / (K_i K_d) = (2 kappa + 3)^2 / (kappa^2 + 6 kappa + 3), which for
-/// kappa >= 1 lies between 2.5 and 4 (K_p^2 / (K_i K_d) = 4 is Ziegler and Nichols' T_i = 4 T_d).
-/// Outside this range, and if kappa would be above `bandwidth_ratio`, no ADRC has these gains. They
-/// are refused, and `limit` in the error is the nearest K_d for which there is one. Use it only if
-/// it is close to your K_d; otherwise b0 is wrong by the same factor.
+/// kappa follows from K_p^2 / (K_i K_d) = (2 kappa + 3)^2 / (kappa^2 + 6 kappa + 3). For kappa >= 1
+/// that lies between 2.5 and 4; 4 is Ziegler and Nichols' T_i = 4 T_d. Outside this range, and if
+/// kappa would be above `bandwidth_ratio`, no ADRC has these gains. They are refused, and `limit`
+/// in the error is the nearest K_d for which there is one. Use it only if it is close to your K_d;
+/// otherwise b0 is wrong by the same factor.
 /// @param pid gains, not zero and of one sign; its filter is ignored
 /// @param bandwidth_ratio kappa for PI, largest kappa for PID; 3 .. 10 gives good step responses,
 ///        less gives less noise

@@ -14,7 +14,7 @@
 /// 4. For each family J is minimised at this rho under the rules; if it cannot keep them, the
 /// design says which one.
 ///    Of free poles J and margins of a chain are the same however they are divided between observer
-///    and law: the division is that at which the search ends, which starts from the law of the LQG
+///    and law. The division is that at which the search ends, which starts from the law of the LQG
 ///    controller; where a rule binds, that of all divisions that breaks the rules least.
 /// 5. Designs are ranked by J; those within 1 % by the cost of an update, then by the
 ///    modulus margin.

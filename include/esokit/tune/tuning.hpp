@@ -85,8 +85,8 @@ struct TuneAlarm {
 };
 
 /// What speaks against a design that keeps its rules: a settling time above the one asked, noise in
-/// u above usual_control_noise, more than three times the deviations of the best linear controller,
-/// and what it does not recover from, or that nothing was simulated.
+/// u above usual_control_noise, more than three times the deviations of the best linear controller.
+/// Also what it does not recover from, or that nothing was simulated.
 std::vector<TuneAlarm> alarms(const Tuning& tuning, const TunedDesign& design);
 
 /// Operations of an update of the observer: additions, products, comparisons and the like in its

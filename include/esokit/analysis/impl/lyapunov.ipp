@@ -42,8 +42,8 @@ inline bool solve_lyapunov_once(const double* a, const double* q, double* p, dou
     }
     return sum_by_doubling(e, p, work1, work2, n);
   }
-  // Cayley transform: with s = c (z - 1) / (z + 1) the sampled equation for (cI - A)^-1 (cI + A)
-  // and 2 c (cI - A)^-1 Q (cI - A)^-T has the same P.
+  // Cayley transform, s = c (z - 1) / (z + 1). The sampled equation has the same P for (cI - A)^-1
+  // (cI + A) and 2 c (cI - A)^-1 Q (cI - A)^-T.
   const double c = std::sqrt(square_size(a, work1, n));
   if (!is_finite(c) || !(c > 0.0)) return false;
   const auto shift = [&](double* to) {

@@ -102,7 +102,7 @@ ESOKIT_FUNCTION Aliases aliases(const TuneModel& model, double gain, double w, d
   found.size = (std::abs)(found.base);
   if (range >= 0.5 * T) return found;
   // A cell is short enough for a straight line: at most 0.2 rad of the frequency itself, which is
-  // half a percent of its size, and where the others count, a sixteenth of a turn of the nearest
+  // half a percent of its size. Where the others count, it is a sixteenth of a turn of the nearest
   // two.
   found.cells =
       found.rest < 0.02 * found.size ? 1 + static_cast<int>(10.0 * w * range) : Aliases::most_cells;
@@ -170,8 +170,8 @@ ESOKIT_FUNCTION LoopCost::LoopCost(const TuneModel& model, const TuneRules& rule
     p.load_power = density * model.disturbance * T_ / std::norm(value) + load;
     points_.push_back(p);
   };
-  // Over v, log x = v + e^(v - last) - e^(first - v), x = W T / 2: even between first and last,
-  // and with steps that grow beyond, to z + 1 = 2e-6.
+  // Over v, log x = v + e^(v - last) - e^(first - v), x = W T / 2. It is even between first and
+  // last; steps grow beyond, to z + 1 = 2e-6.
   const double first = std::log(0.15 * slowest * T_), last = std::log(10.0);
   const double from = first - 1.0, to = last + 2.25;
   const int steps = static_cast<int>(std::ceil(points * (to - from) / std::log(10.0)));
