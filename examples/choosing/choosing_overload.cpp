@@ -319,7 +319,7 @@ Outcome play(std::uint64_t seed, std::uint64_t number, bool priced) {
   if (!tuning || tuning->chosen() == nullptr) {
     outcome.design = !tuning ? std::string(tuning.error().field) + " " + tuning.error().rule
                      : tuning->designs.front().feasible
-                         ? "none comes back, the first not from " + tuning->designs.front().lost
+                         ? "none recovers, the first not from " + tuning->designs.front().lost
                          : "none keeps the rules: " + tuning->designs.front().constraint;
     return outcome;
   }
@@ -359,8 +359,8 @@ int main(int argc, char** argv) {
       {.paper_title = "Choosing an observer",
        .citation = "Our own numbers; the observers are those of the papers",
        .link = "",
-       .title = "Does a recommended design come back after an overload?",
-       .description = "Drawn machines behind limits, with friction, gravity, a lag and an "
+       .title = "Does a recommended design recover from an overload?",
+       .description = "Random plants behind limits, with friction, gravity, a lag and an "
                       "encoder that the model does not have: load pulses, kicks, steps and "
                       "a lost actuator."});
   const auto outcomes =
@@ -437,7 +437,7 @@ int main(int argc, char** argv) {
     }
     rows.push_back(row);
   }
-  report.table("overload", "Runs that did not come back, of those that count",
+  report.table("overload", "Runs that did not recover, of those that count",
                {"event", "order 1", "order 2", "order 3"}, rows);
   std::vector<CsvRow> explained;
   for (std::size_t kind = 1; kind < kinds.size(); ++kind) {
@@ -470,7 +470,7 @@ int main(int argc, char** argv) {
                        number_text(quantile(prices[n][i], 0.9), 4)});
     }
   }
-  report.table("rivals", "After load pulses of 50 %, ours over theirs: 1 is as good",
+  report.table("baselines", "After load pulses of 50 %, ours over theirs: 1 is as good",
                {"order", "PID", "peak and IAE both better", "peak, median", "p90", "IAE, median",
                 "p90", "noise in u, theirs over ours"},
                against);

@@ -450,7 +450,7 @@ int main(int argc, char** argv) {
       static_cast<int>(rest.size()), rest.data(), "choosing", "pid",
       {.title = "Against the best PID",
        .description = "ADRC and PIDs, all tuned for the same J under the same margins and noise in "
-                      "u, on drawn machines: who wins where, and by how much."});
+                      "u, on random plants: who wins where, and by how much."});
   struct Verdict {
     std::string where, variant;
     double ratio;
@@ -461,7 +461,7 @@ int main(int argc, char** argv) {
   figure.caption(
       "Errors of the recommended ADRC over those of the best PID, with the anti-windup, the rule "
       "for lost samples and the reference model that are best in this case: to the left of 1 ADRC "
-      "is better, to the right the PID. Medians of drawn machines. Both are tuned for the same J, "
+      "is better, to the right the PID. Medians of random plants. Both are tuned for the same J, "
       "margins and noise in u, with the same feed-forward.");
   Panel& panel = figure.panel(0, 0)
                      .log_x()
@@ -608,7 +608,7 @@ int main(int argc, char** argv) {
                      ": errors over those of the best PID (sqrt(Ti Td), holds y), "
                      "medians of " +
                      std::to_string(count) +
-                     " drawn machines. A lag that is not told and a wrong order: over the load "
+                     " random plants. A lag that is not known and a wrong order: over the load "
                      "step of the PID that has the right model",
                  head, lines);
     // In percent, of ADRC and of the PIDs with a filter of second order.
@@ -621,7 +621,7 @@ int main(int argc, char** argv) {
                   noise_apart < 2.0, "< 2");
     report.expect(nominal.name, "root of J / J* of the best PID", baselines.front().design.excess,
                   baselines.front().design.feasible && baselines.front().design.recovers,
-                  "keeps the rules and comes back");
+                  "keeps the rules and recovers");
   }
   report.add(figure);
   std::stable_sort(verdicts.begin(), verdicts.end(),

@@ -6,7 +6,7 @@
 //
 // symbol   code                   value
 // u range  u_min, u_max           the largest abs(u) of the log, both ways
-// wish     -                      noise in u: 5 % of that range
+// asked    -                      noise in u: 5 % of that range
 // margins  TuneRules              modulus 0.5, delay 2 samples, b0 wrong by 2
 //
 // --logs N: so many logs; the page shows the few that every run has time for.

@@ -170,8 +170,8 @@ Numerators virtual_reference(const RandomLog& log, const esokit::DynamicSystem& 
   const std::size_t n = lambda.size() - 1;
   const double sum = Numerators::at_one(lambda);
   // In powers of 1 - 1 / z, of which samples much shorter than the poles make numbers that differ.
-  // Q = sum q_i (1 - 1/z)^i, i < N, P = (p_0 + p_1 (1 - 1/z) + ..) / z, k = q_0 / Lambda(1) and p_0
-  // = -Lambda(1), so
+  // Q = sum q_i (1 - 1/z)^i, i < N, P = (p_0 + p_1 (1 - 1/z) + ..) / z, k = q_0 / Lambda(1) and
+  // p_0 = -Lambda(1). So
   //   mu - Lambda(1) u_0 = q_0 (y / Lambda(1) - y_0) - sum q_i y_i - sum p_i u_i.
   Eigen::MatrixXd regressors(rows, static_cast<Eigen::Index>(2 * n - 1));
   Signal yi = y_filtered, ui = later(u_filtered, 1);

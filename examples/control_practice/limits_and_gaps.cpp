@@ -147,7 +147,7 @@ void wind_up(Report& report, const std::string& name, const typename Observer::C
                 percent * (limited.overshoot - truth.overshoot),
                 std::abs(limited.overshoot - truth.overshoot) < 0.01 * step_size, "within 1 %");
   report.expect(name, "innovations minus those without limits", worst, worst < 1e-9, "below 1e-9");
-  report.expect(name, "overshoot if told the unlimited u (% of the step)",
+  report.expect(name, "overshoot if given the unlimited u (% of the step)",
                 percent * ignorant.overshoot,
                 ignorant.overshoot > truth.overshoot + 0.1 * step_size, "clearly worse");
   rows.push_back({name, number_text(percent * truth.overshoot, 4),

@@ -135,10 +135,9 @@ int main(int argc, char** argv) {
 
   Figure figure("with_and_without", {.rows = 2, .columns = 1, .panel_height = 170});
   figure.caption(
-      "A servo pushed by a load that no one told the controller. Top: its angle, with the "
-      "estimated "
-      "disturbance cancelled and without. Bottom: the disturbance that acts (load and friction), "
-      "and the observer's estimate of it.");
+      "A servo pushed by a load that the controller does not know. Top: its angle, with the "
+      "estimated disturbance cancelled and without. Bottom: the disturbance that acts (load and "
+      "friction), and the observer's estimate of it.");
   auto& angle = figure.panel(0, 0)
                     .y_label("angle (rad)")
                     .x_range(0, 5)

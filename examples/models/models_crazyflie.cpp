@@ -127,7 +127,7 @@ void axis(Report& report, const std::filesystem::path& file, bool pitch, std::ve
   line("in the model", known);
   line("model 30 % short", too_short);
   line("model 30 % long", too_long);
-  line("in the model, beside a swing of 6.5 Hz", beside);
+  line("in the model, beside a resonator at 6.5 Hz", beside);
   report.expect(name, "RMS of the innovation, of that ignored",
                 known.innovation / ignored.innovation, known.innovation < 0.8 * ignored.innovation,
                 "below 0.8");

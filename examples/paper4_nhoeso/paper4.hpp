@@ -2,7 +2,7 @@
 /// What the examples of this paper share: its name, parameter sets, and the loop of section 6.
 ///
 /// A. T. Azar, F. A. Abdul-Majeed, H. S. Majdi, I. A. Hameed, N. A. Kamal, A. J. M. Jawad, A. H.
-/// Abbas, W. R. Abdul-Adheem, I. K. Ibraheem, "Parameterization of a Novel Nonlinear Estimator for
+/// Abbas, W. R. Abdul-Adheem, I. K. Ibraheem. "Parameterization of a Novel Nonlinear Estimator for
 /// Uncertain SISO Systems with Noise Scenario", Mathematics 10 (2022) 2261,
 /// doi:10.3390/math10132261.
 #pragma once
