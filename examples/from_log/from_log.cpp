@@ -1,4 +1,4 @@
-// One command from a log to a controller: reads a CSV file, finds the machine in it, chooses an
+// One command from a log to a controller. It reads a CSV file, finds the machine in it, chooses an
 // observer and its bandwidths, and writes one HTML page with all that was seen and the C++ to
 // paste.
 //

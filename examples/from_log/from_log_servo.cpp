@@ -6,7 +6,7 @@
 //
 // Plant       theta'' = a v - b theta' - c tanh(theta' / w_s) - load(t),  tau v' + v = u(t - L),
 //             |u| <= u_max, y = theta, quantised by the encoder, with noise
-// PID         K_p 3, K_i 1, K_d 0.1: overshoots, and swings under a load
+// PID         K_p 3, K_i 1, K_d 0.1: overshoots, and oscillates under a load
 //
 // symbol    code        value     unit
 // a         gain        80        rad/s2 per V

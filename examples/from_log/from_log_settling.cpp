@@ -1,5 +1,5 @@
 // How soon what from_log pastes settles, beside a PI or PID by the rules of SIMC that is slowed
-// until it puts the same noise into u: random plants that settle by themselves, after a step of r
+// until it puts the same noise into u. Random plants that settle by themselves, after a step of r
 // and after a load. Ours goes through the profile of its code, the PID gets the step at once.
 //
 // Plant  order 1: y' = -a y + b v(t - L) + d, order 2: y'' = -a y' + b v(t - L) + d; tau v' + v = u

@@ -43,8 +43,8 @@ std::vector<std::string> split_words(const std::string& text) {
   return all;
 }
 
-/// The words of a name, and its unit where it is told: /joint1/effort_Nm -> effort, nm; t/ms and
-/// t [ms] -> t, ms.
+/// The words of a name, and its unit where it is given: /joint1/effort_Nm -> effort, nm; t/ms and t
+/// [ms] -> t, ms.
 std::vector<std::string> words(const std::string& name) {
   std::string text = lower(name);
   // A stroke is before a unit or between the parts of a topic.
@@ -221,7 +221,7 @@ std::string increment_of(const LogFile& file) {
   return "";
 }
 
-/// Finds the unit of the stamps: as told, by the column's name, the line of units or what stands
+/// Finds the unit of the stamps: as given, by the column's name, the line of units or what stands
 /// behind the numbers, else by value and step. What stays open is asked for.
 double find_unit(const Settings& settings, const LogFile& file, const ClockRead& clock,
                  Input& input) {
@@ -327,7 +327,7 @@ void merge(Input& input) {
 }
 
 /// An angle that begins anew after a turn is no motion: made continuous, with an alarm unless the
-/// turn was told.
+/// turn was given.
 void unwrap(const Settings& settings, Input& input) {
   std::vector<double>& y = input.log.y;
   if (settings.wrap && !(*settings.wrap > 0.0)) return;

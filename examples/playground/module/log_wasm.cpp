@@ -55,7 +55,7 @@ EXPORTED(points) const char* points(int i) {
   return result.figures[static_cast<std::size_t>(i)].numbers.c_str();
 }
 
-// Of what is played with.
+// Of the simulation.
 EXPORTED(settings) double* settings_here() { return settings.data(); }
 EXPORTED(c_header) const char* c_header() {
   c_code = playground::c_of(settings);

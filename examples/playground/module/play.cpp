@@ -51,7 +51,7 @@ constexpr std::array<Field, field_count> all_fields{{
     {"resonance", "resonance", "rad/s", "Machine", Kind::number_or_none, 1, 1e4, 0, "",
      "a shaft or belt between actuator and machine"},
     {"resonance_damping", "its damping", "", "Machine", Kind::number, 1e-3, 1, 0.05, "",
-     "1: none of it swings"},
+     "1: it does not oscillate"},
     {"friction", "dry friction", "y\u207d\u207f\u207e", "Machine", Kind::number_or_none, 1e-3, 1e4,
      0, "", "as large at any speed, against it"},
     {"load", "load", "y\u207d\u207f\u207e", "Machine", Kind::number_or_none, 1e-3, 1e5, 20, "",
@@ -68,8 +68,8 @@ constexpr std::array<Field, field_count> all_fields{{
      0.05, 1e4, 10, "", "how fast y follows"},
     {"observer_bandwidth", "observer bandwidth \u03c9o", "rad/s", "Controller", Kind::number, 0.2,
      1e5, 100, "", "how fast the disturbance is found"},
-    {"gain_factor", "b\u2080 told to it / true b\u2080", "", "Controller", Kind::number, 0.1, 10, 1,
-     "", "1: it knows b\u2080"},
+    {"gain_factor", "known b\u2080 / true b\u2080", "", "Controller", Kind::number, 0.1, 10, 1, "",
+     "1: it knows b\u2080"},
     {"knows_dead_time", "knows the dead time", "", "Controller", Kind::on_off, 0, 1, 0, "",
      "DelayedInput, whole samples"},
     {"limit", "limit of u, \u00b1", "u", "Controller", Kind::number, 1e-3, 1e5, 5, "",
@@ -124,7 +124,7 @@ std::string said(const Error<double>& error) {
 template <int States>
 using Plant = LinearPlant<States>;
 
-// Behind a shaft that swings: q'' + 2 zeta w q' + w^2 q = w^2 u, and q drives the plant.
+// Behind a shaft that oscillates: q'' + 2 zeta w q' + w^2 q = w^2 u, and q drives the plant.
 template <int States>
 Plant<States + 2> with_resonance(const Plant<States>& plant, double w, double zeta) {
   Plant<States + 2> bigger;

@@ -1,4 +1,4 @@
-// The same lines, native: plays each line of a file of settings and writes every number.
+// The same lines, native: simulates each line of a file of settings and writes every number.
 //   playground_twin SETTINGS OUT
 #include <cstdio>
 #include <cstring>

@@ -158,9 +158,9 @@ Expected<Interval<>, Error<double>> input_gain_range(const LinearPlant<States, S
 }
 
 /// The factor f > 1 such that the loop is stable while the loop gain at this actuator (and so b /
-/// b0) varies arbitrarily between samples, by 1/f to f times its nominal value. Circle criterion: f
-/// + 1/f < (1 + abs(L)^2) / -Re L at all frequencies. The bound is sufficient, not necessary. Lag,
-/// delay and sensor are included if they are part of the plant.
+/// b0) varies arbitrarily between samples, from 1/f to f times its nominal value. By the circle
+/// criterion that is f + 1/f < (1 + abs(L)^2) / -Re L at all frequencies. The bound is sufficient,
+/// not necessary. Lag, delay and sensor are included if they are part of the plant.
 /// @return the factor and the frequency that limits it; infinity if Re L is never negative; error
 /// for a nominal loop that is not stable, or if there is no such channel
 Expected<Margin, Error<double>> gain_variation(const Loop& loop, int channel = 0);

@@ -1,7 +1,7 @@
 /// @file
-/// The falling-bandwidth gain law of the frequency-shifting-based (FSB) algebraic observer (J.
-/// Kasac, A. Pender, M. Pranjic, D. Kotarski, Asian Journal of Control 23 (2021) 2171-2184),
-/// sampled exactly and for any order and any number of extended states.
+/// The falling-bandwidth gain law of the frequency-shifting-based (FSB) algebraic observer, sampled
+/// exactly and for any order and any number of extended states. J. Kasac, A. Pender, M. Pranjic, D.
+/// Kotarski, Asian Journal of Control 23 (2021) 2171-2184.
 ///
 /// In continuous time the error obeys (D + mu(t))^N e_1 = d^(m), D = d/dt, mu(t) = lambda + N q /
 /// (e^{qt} - 1): its poles start at minus infinity and settle at -lambda. Sampled, with rho =
@@ -35,8 +35,8 @@ namespace esokit {
 /// rounding, the gain is constant.
 ///
 /// Every `anchor_interval` samples p^i and [i] are recomputed from an integer count of samples,
-/// because the recursion alone accumulates rounding errors (in float, with q = 0 it would stop at i
-/// = 2^24, with qT = 1e-8 it would be 1 % off after 1e6 samples). Such an update takes up to 30
+/// because the recursion alone accumulates rounding errors. In float, with q = 0 it would stop at i
+/// = 2^24, with qT = 1e-8 it would be 1 % off after 1e6 samples. Such an update takes up to 30
 /// additional short multiplication steps.
 template <int Size, Scalar S>
 class AlgebraicGain {

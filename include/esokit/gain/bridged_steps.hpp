@@ -8,8 +8,8 @@
 /// - if all of them are shorter than `reach` / omega_o, or
 /// - if none is longer than `ratio` times the shortest one, for every omega_o.
 ///
-/// Proven by a quadratic function e' P e that falls in each step, found on a workstation for
-/// each N: for `reach` one P for all x in (0, reach], for `ratio` one P for each ratio of the
+/// Proven by a quadratic function e' P e that falls in each step, found on a workstation for each
+/// N. For `reach` it is one P for all x in (0, reach], for `ratio` one P for each ratio of the
 /// bandwidth to the shortest step. The search for the worst sequence finds growing ones from 1.05
 /// to 1.5 times `reach` on (N = 3 .. 7: x = 18.1, 5.75, 3.54, 2.53, 1.88), half gains with N = 4: 5
 /// times.
@@ -65,14 +65,14 @@ constexpr int longest_step(const S& decay) noexcept {
 }
 
 /// For many states one P is used that has a closed form, the integral of e^-s times the square of
-/// the polynomial that the error was s ago: it proves less the more states there are.
+/// the polynomial that the error was s ago. It proves less the more states there are.
 constexpr double reach_by_size(double factor, int size) noexcept { return factor / (size * size); }
 
 /// What longer steps cost, in corrections. With V(e) = e' P^-1 e, P = sum_i (A k)(A k)' / q^i, each
 /// ordinary correction takes V to q V at most, and so does one after up to `counted` samples. One
 /// after M samples may multiply V by 1 / q^D: then D of the others have to follow before V is below
 /// what it was. So errors decay in each sequence of steps in which longer ones than a BridgedSteps
-/// allows are only taken while no correction is due: V falls from one such time to the next, and if
+/// allows are only taken while no correction is due. V falls from one such time to the next, and if
 /// there is none any more, what remains is a sequence of bridged steps.
 ///
 /// For a chain, V grows at most like M^(2 (N - 2)), so that D rises with the logarithm of M.

@@ -69,8 +69,8 @@ struct MatrixTransition {
 /// P = L D L', N x N, in the Nordsieck scaling of the chain (all states have the unit of y), with L
 /// unit lower triangular and D diagonal, not negative.
 ///
-/// The first state is the measured one, so the first column of L is the direction of the gain, and
-/// a measurement changes only D_1: P C' = D_1 l_1, and C l_i = 0 for i > 1.
+/// The first state is the measured one, so the first column of L is the direction of the gain. A
+/// measurement changes only D_1: P C' = D_1 l_1, and C l_i = 0 for i > 1.
 template <int Size, Scalar S>
 class CovarianceFactor {
   static constexpr bool unrolled = Size <= 5;

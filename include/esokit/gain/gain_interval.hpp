@@ -44,8 +44,8 @@ constexpr S least_factor(const S& power) noexcept {
 
 }  // namespace detail
 
-/// Constant k for which the continuous error polynomial s^N + k ((s + omega)^N - s^N) is stable: k
-/// > 1 / (1 + sec(pi/N)^N), which is 0 for N = 2, without an upper limit.
+/// Constant k for which the continuous error polynomial s^N + k ((s + omega)^N - s^N) is stable. It
+/// is k > 1 / (1 + sec(pi/N)^N), which is 0 for N = 2, without an upper limit.
 template <int Size>
 constexpr Interval<double> constant_gain_interval() noexcept {
   return {detail::least_factor<Size>(1.0), detail::unbounded<double>()};

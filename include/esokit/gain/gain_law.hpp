@@ -48,8 +48,8 @@ struct GainLawTraits {
   bool continues = false;
 
   /// `gap_gain(e, samples) const`: the gain if `samples` (unsigned) > 1 sample times have passed
-  /// since the last correction, and `longest_gap(asked) const`: how many missing samples the law
-  /// bridges, at most `asked`, so that errors decay in any sequence of gaps; after more the
+  /// since the last correction. `longest_gap(asked) const`: how many missing samples the law
+  /// bridges, at most `asked`, so that errors decay in any sequence of gaps. After more the
   /// observer restarts, or see `recovers`. Without them `gain(e)` is used: a constant gain then
   /// diverges in recurring gaps. A law that follows time in `advance()` does not need these hooks.
   bool bridges_gaps = false;

@@ -2,11 +2,11 @@
 /// A quadratic function of the error that falls in every step of a set: then any sequence of these
 /// steps decays.
 ///
-/// With P = sum_i (A k)(A k)' / rho^i, the covariance of what a noise in the measurements leaves in
-/// the estimate if its share is discounted by rho a sample, V(e) = e' P^-1 e falls at least by rho
-/// in each sample with the gain k. Another step e -> A_M e is joined to them if V falls in it, too,
-/// which is A_M P A_M' < P. (With all poles in one place, P^-1 is the information of least squares
-/// with exponential forgetting.)
+/// P = sum_i (A k)(A k)' / rho^i is the covariance of what a noise in the measurements leaves in
+/// the estimate if its share is discounted by rho a sample. With it V(e) = e' P^-1 e falls at least
+/// by rho in each sample with the gain k. Another step e -> A_M e is joined to them if A_M P A_M' <
+/// P, for then V falls in it, too. (With all poles in one place, P^-1 is the information of least
+/// squares with exponential forgetting.)
 #pragma once
 
 #include <cmath>

@@ -5,18 +5,18 @@
 /// The error has the characteristic polynomial p_1 with all gains, p_0 without the last one, and
 /// p_0 + phi (p_1 - p_0) if the last correction is multiplied by phi. By the circle criterion any
 /// phi(k) in [0, 1] is stable if Re G > -1 on the unit circle, where G = (p_1 - p_0) / p_0. This is
-/// Re p_1 / p_0 > 0, the same test as for a pair of gain sets, except that p_0 has a root at z = 1,
-/// because a disturbance that is not corrected stays. If the disturbance leaks, that is, is
-/// multiplied by 1 - a after each correction, both polynomials p become (1 - a) p + a z p_m, where
-/// p_m is that of all gains but the last; the root at z = 1 moves to 1 - a.
+/// Re p_1 / p_0 > 0, the same test as for a pair of gain sets. But p_0 has a root at z = 1, because
+/// a disturbance that is not corrected stays. If the disturbance leaks (after each correction it is
+/// multiplied by 1 - a), both polynomials p become (1 - a) p + a z p_m. Here p_m is that of all
+/// gains but the last; the root at z = 1 moves to 1 - a.
 ///
 /// Between two holds of the plant (y, 0, .., 0 is known then, so that only the disturbance is in
 /// error) more can be said. Let e be its error and h(j) the answer of the innovation to an e of one
-/// sample, while nothing corrects e; so the innovation is sum_j h(j) e(k - j), and e moves by at
+/// sample, while nothing corrects e. So the innovation is sum_j h(j) e(k - j), and e moves by at
 /// most r = k sum |h| in a sample if abs(e) was never above 1. To pass -1 for the first time e
 /// needs a positive innovation while it is at -1, hence was at most min(1, r j - 1) j samples
 /// before. If sum h+(j) min(1, r j - 1) + h-(j) is below zero, with h+ - h- = h, that cannot be,
-/// whatever phi(k) in [0, 1]: an error is never larger than at the hold before, and nothing can
+/// whatever phi(k) in [0, 1]. An error is never larger than at the hold before, and nothing can
 /// grow over any number of holds.
 #pragma once
 
@@ -63,9 +63,9 @@ bool certified_against(const ErrorPolynomial<Size, S>& p, const ErrorPolynomial<
 
 }  // namespace detail
 
-/// True if the error of a sampled observer of the chain with one extended state stays bounded (by a
-/// common quadratic Lyapunov function) while corrections of the disturbance are multiplied by any
-/// phi(k) in [0, 1].
+/// True if the error of a sampled observer of the chain with one extended state stays bounded while
+/// corrections of the disturbance are multiplied by any phi(k) in [0, 1]. Proven by a common
+/// quadratic Lyapunov function.
 /// @param gain scaled current-estimator gain
 /// @param leak a: the share of the disturbance that is removed after each correction, 0 .. 1
 template <int Size, Scalar S>
@@ -279,8 +279,8 @@ bool never_grows(const ErrorAfterHold<Size, S>& frozen, bool leaks) {
 
 /// What holds and releases of the plant do to the error of the disturbance, see the head of this
 /// file. Where the argument there fails (slow sines), the common Lyapunov function V of
-/// `gating_certified` says: among all errors with the same error of the disturbance V is least for
-/// the one to which an uncorrected observer settles. So if nothing is corrected until this has
+/// `gating_certified` serves. Among all errors with the same error of the disturbance V is least
+/// for the one to which an uncorrected observer settles. So if nothing is corrected until this has
 /// settled, whatever follows cannot take the error of the disturbance beyond its value then.
 /// @param level the level, which is gating_certified @param leaks whether the constant leaks
 template <int Size, Scalar S>

@@ -130,7 +130,7 @@ struct PartDesign {
     const Square sample = corrected(step, output, gain);
     std::optional<Proven> proven;
     // Which V suits best depends on how far the poles are apart, and on how far a sine turns while
-    // samples are missing: with P in the place of k k' its sum is spread over more directions. What
+    // samples are missing. With P in the place of k k' its sum is spread over more directions. What
     // the gain does not move, as a lag that is only computed, has an error all the same. A step in
     // which V rises is added to the sum of which P consists; that lets V fall there, and rise
     // elsewhere.
@@ -198,9 +198,9 @@ struct PartDesign {
     return error + Square::Identity();
   }
 
-  /// A gain for a step, and up to which one V falls with it: that whose error is nearest to the one
-  /// that as many ordinary corrections leave, in the mean over all errors of covariance P; where V
-  /// would rise with it, one between it and that of a Kalman filter.
+  /// A gain for a step, and up to which one V falls with it. Its error is nearest to the one that
+  /// as many ordinary corrections leave, in the mean over all errors, whose covariance is P here.
+  /// Where V would rise with it, one between it and that of a Kalman filter.
   /// @param middle Phi^M - I @param ordinary A^M - I @param noise R, halved as far as V asks for
   /// @param most what `reached` returns if V falls in all steps that share the gain
   template <class Reached>
@@ -286,7 +286,7 @@ struct PartDesign {
 /// places.
 ///
 /// The chain bridges a gap by the gain that places the poles for a step of M T. With a resonator
-/// this fails: sampled at every M-th sample it can look like a constant, and the gain grows without
+/// this fails. Sampled at every M-th sample it can look like a constant, and the gain grows without
 /// bound (50 Hz at 1 ms: 1e5 after 10 missing samples). Instead this law takes the gain whose error
 /// is nearest to the one A^M e that M ordinary corrections leave, A = (I - k C) Phi,
 ///
@@ -303,7 +303,7 @@ struct PartDesign {
 /// measurements. Gaps are bridged up to the longest for which there is such an R, so errors decay
 /// in any sequence of them. After longer gaps the last R serves, and corrections are due before the
 /// next one, see `recovery`. Steps of 5 samples and more share a gain with those up to a fourth
-/// longer (that of M in the middle), and V is tested in each of them: 22 gains last for 401
+/// longer (that of M in the middle), and V is tested in each of them. So 22 gains last for 401
 /// samples.
 /// @tparam MostBridged longest step to be considered, samples
 template <int Size, Scalar S, class Placement, int MostBridged>

@@ -3,9 +3,9 @@
 /// gain/pole_set.hpp.
 ///
 /// A placement is a template argument of a linear observer. It defines what the config specifies
-/// (`Spec`), the check of it, the gains in both time domains, and what is known of
-/// steps over several samples (`recovery`, see gain/bridged_steps.hpp; without it every gap
-/// restarts the observer).
+/// (`Spec`), the check of it, the gains in both time domains, and what is known of steps over
+/// several samples. That is `recovery`, see gain/bridged_steps.hpp; without it every gap restarts
+/// the observer.
 #pragma once
 
 #include <esokit/core/check.hpp>

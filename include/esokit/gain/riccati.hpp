@@ -3,7 +3,7 @@
 ///
 ///     P- = inflation Phi P Phi' + Q,  K = P- C' (C P- C' + R)^-1,  P = (I - K C) P-
 ///
-/// It is found by Newton's method on the gain (G. A. Hewer, 1971): the covariance for a given
+/// It is found by Newton's method on the gain (G. A. Hewer, 1971). The covariance for a given
 /// stable gain solves a Stein equation, which is summed from positive terms by Smith's doubling
 /// method, and gives the next gain. The first gain puts all poles at zero, which is always possible
 /// for a chain of integrators. The iteration converges quadratically to the stabilising solution,

@@ -4,8 +4,8 @@
 /// 042201).
 ///
 /// P- is a bound on the covariance of the error of the predicted state, R the variance of the
-/// measurement noise, and theta > 0 the inflation, which accounts for the correlation of the
-/// disturbance with the error:
+/// measurement noise. The inflation theta > 0 accounts for the correlation of the disturbance with
+/// the error:
 ///
 ///     s = C P- C' + R/(1+theta),  k = P- C' / s                                (24), corrected
 ///     P- <- (1+theta) Phi (I - k C) P- (I - k C)' Phi' + (Phi k) R (Phi k)'

@@ -2,7 +2,7 @@
 /// Gains of the sampled predictor-corrector from the poles of its estimation error.
 ///
 /// With w the delay operator, a constant gain gives the innovation e = (1-w)^N / prod(1 - rho_i w)
-/// y, so the gain polynomial kappa(t) = sum_r k_r t^r (k_r scaled, t in samples) interpolates the
+/// y. So the gain polynomial kappa(t) = sum_r k_r t^r (k_r scaled, t in samples) interpolates the
 /// impulse response of prod(1 - rho_i w) / (1-w)^N at t = 1, 2, .. . Written with contractions a_i
 /// = 1 - rho_i, 1 - rho_i w = a_i + rho_i (1-w), that gives
 ///

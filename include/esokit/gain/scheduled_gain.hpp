@@ -13,7 +13,7 @@ namespace esokit {
 /// table and, by a check in `make`, half way between two of them. While the speed changes, it holds
 /// only if the change is slow in comparison with the decay of the error.
 ///
-/// One constant gain for all speeds is not enough: designed for a frequency equal to the observer's
+/// One constant gain for all speeds is not enough. Designed for a frequency equal to the observer's
 /// bandwidth, it tolerates 0.7 to 1.8 times this frequency, for three times the bandwidth only 0.9
 /// to 1.2 times.
 /// @tparam Count number of speeds in the table, each of MostBridged x N numbers

@@ -3,8 +3,8 @@
 ///
 /// The error dynamics A_1, A_2 of two gain sets on the same chain differ by a matrix of rank one.
 /// They share a quadratic Lyapunov function, and so stay stable under any switching and any
-/// blending, iff both are stable and A_2 A_1 has no negative real eigenvalue (H. Lin, P. J.
-/// Antsaklis, IEEE Transactions on Automatic Control 54 (2009) 308-322). det(A_2 A_1 + x I) is, up
+/// blending, iff both are stable and A_2 A_1 has no negative real eigenvalue. H. Lin, P. J.
+/// Antsaklis, IEEE Transactions on Automatic Control 54 (2009) 308-322. det(A_2 A_1 + x I) is, up
 /// to its sign, the polynomial Re[p_2(jw) p_1(-jw)] in x = w^2, p_i the characteristic polynomials:
 /// an eigenvalue -x is a root x > 0 of it. So the test of the eigenvalues becomes one of the
 /// positivity of a polynomial, without an eigenvalue solver. Sampled pairs are tested after the

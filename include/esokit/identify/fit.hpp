@@ -41,8 +41,8 @@ class InnovationsFit {
   [[nodiscard]] Fit minimise(const FitPoint& start, bool with_bandwidth, int steps = 25);
 
   /// Derivatives of the innovations with respect to the free parameters, then the linear ones, then
-  /// latency and squared lag of each timed column; and which parameters are free: 0 log w,
-  /// 1 log(tau + L), 2 share squared, 3 a (tau + L).
+  /// latency and squared lag of each timed column. Also which parameters are free: 0 log w, 1
+  /// log(tau + L), 2 share squared, 3 a (tau + L).
   struct Sensitivities {
     std::vector<std::vector<double>> columns;  ///< one for each parameter, each as long as the log
     std::vector<int> free;                     ///< the parameters to which the first of them belong
@@ -77,9 +77,9 @@ class InnovationsFit {
   /// The point, limited to the bounds.
   [[nodiscard]] FitPoint inside(FitPoint p) const;
 
-  /// The measurement noise from the innovations of the fit that `at` or `minimise` returned last,
-  /// at frequencies where the disturbance has less than a tenth of the noise's power, as the median
-  /// over all stretches; 0 if these are too few. Effects that are not in the model are slower (a
+  /// The measurement noise from the innovations of the fit that `at` or `minimise` returned last:
+  /// the median over all stretches at frequencies where the disturbance has less than a tenth of
+  /// the noise's power. 0 if these are too few. Effects that are not in the model are slower (a
   /// flexible mode) or occasional (stiction), so they do not affect this number, while they affect
   /// `Fit::noise`.
   [[nodiscard]] Estimate noise_floor(const Fit& fit) const;
@@ -95,9 +95,9 @@ class InnovationsFit {
                                std::size_t to = (std::numeric_limits<std::size_t>::max)());
 
  private:
-  /// Rows at the start of a piece that only fill the lag and the dead time: those of the longest
-  /// latency, unless much of the motion of u lies there, as in the record of a step. Then u is
-  /// taken to have been at rest before. Else, if it is unknown, what the lag has left of the u
+  /// Rows at the start of a piece that only fill the lag and the dead time. They are those of the
+  /// longest latency, unless much of the motion of u lies there, as in the record of a step. Then u
+  /// is taken to have been at rest before. Else, if it is unknown, what the lag has left of the u
   /// before is fitted: a heater that is on when the log begins may have been off a moment ago.
   [[nodiscard]] std::size_t lead(std::size_t from, std::size_t to) const;
   [[nodiscard]] std::size_t longest_lead(std::size_t from, std::size_t to) const;

@@ -48,7 +48,7 @@ bool lead_harms(const Identified& found);
 bool informed(const Identified& found);
 
 /// Half width that b0 of a plateau within two octaves of the lowest bandwidth needs. There every
-/// fit is one of output error, so that neighbours agree tells nothing: b0 has to reach to the
+/// fit is one of output error, so that neighbours agree tells nothing. b0 has to reach to the
 /// interval of that of up to four octaves above, where the log is far more likely: by more than
 /// e^10.
 double reach_above(const Plateau& plateau, double bandwidth_min);

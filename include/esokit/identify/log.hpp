@@ -60,17 +60,17 @@ namespace detail {
 
 double median(std::vector<double> values);
 
-/// Puts what lies between its neighbours in the place of numbers of a column that are not finite:
-/// up to four in succession, or three times as many as usually lie between two that are (a column
-/// that is measured seldom). @return how many
+/// Puts what lies between its neighbours in the place of numbers of a column that are not finite.
+/// Up to four in succession, or in a column that is measured seldom three times as many as usually
+/// lie between two that are. @return how many
 std::size_t bridge(std::vector<double>& column);
 
 }  // namespace detail
 
 /// Checks a log and converts it to a constant sample time. If the time stamps jitter by more than 2
 /// % of T, or rows are missing, u is the mean of what the actuator held in the row (also said by
-/// rows without y), y and the columns are interpolated linearly, and `FitData::measured` has y as
-/// and when it was measured.
+/// rows without y). Then y and the columns are interpolated linearly, and `FitData::measured` has y
+/// as and when it was measured.
 [[nodiscard]] Expected<PreparedLog, Error<double>> prepare(const Log& log);
 
 /// Twenty evenly spread stretches of `most` rows in total, each with a load of its own; all data if

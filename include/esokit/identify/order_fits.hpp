@@ -62,7 +62,7 @@ std::vector<OrderFit> fit_orders(const FitData& data, const IdentifyOptions& opt
                                  const FitBounds& bounds, const std::vector<OrderFit>& before = {});
 
 /// The order with the best likelihood, unless another one leaves less than 1 / e of the mean square
-/// at lower bandwidths: at its own bandwidth the likelihood depends on the fastest motion, which in
+/// at lower bandwidths. At its own bandwidth the likelihood depends on the fastest motion, which in
 /// a flexible machine is the bending. One that is only a part of the likely one says nothing new.
 [[nodiscard]] std::vector<OrderFit>::const_iterator best_order(const std::vector<OrderFit>& orders);
 
@@ -87,10 +87,10 @@ struct HeldLog {
 std::optional<HeldLog> held_log(const FitData& rows, const FitModel& model, const FitBounds& bounds,
                                 const Fit& here, const std::vector<double>& speed);
 
-/// Whether a force that depends on position acts: it improves the likelihood by more than its
+/// Whether a force that depends on position acts. It improves the likelihood by more than its
 /// parameters cost, or it leaves less than 1 / e of the mean square at a tenth of the bandwidth.
-/// (At the full bandwidth everything slow is attributed to the disturbance.)
-/// Friction that holds looks like such a force, as it takes most of u: not if it leaves less there.
+/// (At the full bandwidth everything slow is attributed to the disturbance.) Friction that holds
+/// looks like such a force, as it takes most of u: not if it leaves less there.
 bool position_acts(const FitData& data, const OrderFit& order, bool friction);
 
 }  // namespace detail

@@ -65,9 +65,9 @@ FittedSine fit_sine(const FitData& data, const FitModel& model, const FitBounds&
 
 /// Frequencies (rad/s) of the sines in the innovations of `data`, the largest first. A sine counts
 /// if it improves the likelihood by more than amplitude, phase, frequency and the search for it
-/// cost, if its amplitude is at least three standard errors, and if it is not small in comparison
-/// with the effect of u at its frequency (otherwise it could be a model error at a frequency of the
-/// reference).
+/// cost, and if its amplitude is at least three standard errors. Also it must not be small in
+/// comparison with the effect of u at its frequency: it could be a model error at a frequency of
+/// the reference.
 std::vector<double> find_sines(FitData data, const FitModel& model, const FitBounds& bounds,
                                const FitPoint& point, int most);
 

@@ -24,13 +24,13 @@ struct NoNominalModel {};
 template <>
 inline constexpr std::uint32_t type_tag<NoNominalModel> = make_type_tag<>("NoNominalModel");
 
-/// A model fbar(x, u, t) of the total disturbance, in the unit of y^(n), of the plant states x, the
-/// held input u and the time t in seconds since the start or the last reset.
+/// A model fbar(x, u, t) of the total disturbance, in the unit of y^(n). x are the plant states, u
+/// the held input and t the time in seconds since the start or the last reset.
 ///
 /// fbar depends on the estimated state and changes the estimated d: this is a loop inside the
 /// filter, which the gains have to stabilise. If the gains are slower than the dynamics of fbar,
-/// the estimate oscillates, limited only by the bound on the change (example: T = 0.8 s, fbar =
-/// -0.5 y, q_n T^2 / sqrt(R) = 0.03).
+/// the estimate oscillates, limited only by the bound on the change. Example: T = 0.8 s, fbar =
+/// -0.5 y, q_n T^2 / sqrt(R) = 0.03.
 template <class Model, int Order, class S>
 concept NominalModel = std::copyable<Model> &&
     (std::same_as<Model, NoNominalModel> ||
@@ -42,7 +42,7 @@ concept NominalModel = std::copyable<Model> &&
 /// noise.
 ///
 /// The gain follows from R, the variance of the noise, and from Q, which bounds by how much the
-/// state may deviate from its model within a sample; for m = 1 this is mainly the change of the
+/// state may deviate from its model within a sample. For m = 1 this is mainly the change of the
 /// disturbance. P0 speeds up the start. `covariance` is an upper bound on the covariance matrix of
 /// the error if Q and R are bounds. In a closed loop the noise acts on u, and u changes the
 /// disturbance: the bounds have to cover this, too.
@@ -106,11 +106,11 @@ class ExtendedStateFilter
     /// n the change of d, for r > n that of its derivatives. Q = bound_factor diag(q_r^2).
     ///
     /// If n + m is odd and only the highest state has a bound, an error that changes sign at every
-    /// sample is not visible in y: without noise the limit has a pole at -1, and this error decays
-    /// only as 1/k. Such a config is refused, unless R (plus the contribution of Q at half the
-    /// sampling rate) is at least a millionth of the trace of Q, with each state scaled by T^r/r!,
-    /// or the inflation is 0.01 or more. With just a millionth the error falls to 1e-6 in 2000
-    /// samples for n + m = 3, 4400 for 5, 20000 for 7.
+    /// sample is not visible in y. Without noise the limit has a pole at -1, and this error decays
+    /// only as 1/k. Such a config is refused, unless the inflation is 0.01 or more, or R is large
+    /// enough. R (plus the contribution of Q at half the sampling rate) must be at least a
+    /// millionth of the trace of Q, with each state scaled by T^r/r!. With just a millionth the
+    /// error falls to 1e-6 in 2000 samples for n + m = 3, 4400 for 5, 20000 for 7.
     Array<S, N> disturbance_bounds{};
     /// c: c = N covers N bounded errors with any correlation. The paper has 1 in (12) and 2 in
     /// (34).

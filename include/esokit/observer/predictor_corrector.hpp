@@ -49,13 +49,13 @@ Check<S> check_chain(const ChainConfig<S>& config) {
 ///
 /// One instance belongs to one thread. No member allocates, throws or locks after `make`.
 ///
-/// After any input, however bad, valid samples lead back to a good estimate: the error decays by
-/// e^(-r T) a sample, r the rate of its slowest pole, from the largest number of the scalar to
-/// rounding in at most 60 + 2 ln(max / epsilon) / (r T) samples. This is tested with every observer
-/// and adapter: double 60 + 1500 / (r T), float 60 + 210 / (r T) samples. With all poles at one
-/// bandwidth r is omega_o; of a cascade it is the least bandwidth, of half gains omega_o / 2, and
-/// no faster than what a model computes without correcting it, such as the lag of an actuator (1 /
-/// tau). `-stability_abscissa(observer_system(observer))` (analysis) is 1 - e^(-r T).
+/// After any input, however bad, valid samples lead back to a good estimate. The error decays by
+/// e^(-r T) a sample, r the rate of its slowest pole. From the largest number of the scalar to
+/// rounding it takes at most 60 + 2 ln(max / epsilon) / (r T) samples. This is tested with every
+/// observer and adapter: double 60 + 1500 / (r T), float 60 + 210 / (r T) samples. With all poles
+/// at one bandwidth r is omega_o, of a cascade the least bandwidth, of half gains omega_o / 2. It
+/// is no faster than what a model computes without correcting it, such as the lag of an actuator (1
+/// / tau). `-stability_abscissa(observer_system(observer))` (analysis) is 1 - e^(-r T).
 ///
 /// @tparam Order n, order of the plant @tparam Extension m, extended states
 /// @tparam Law gain law, see GainLaw @tparam Levels p
@@ -214,7 +214,7 @@ requires(detail::is_a_gain_law<Law, Order + Extension, S>() &&
     }
   }
 
-  /// Takes over the settings of `fresh` and keeps the estimate: states are rescaled to its sample
+  /// Takes over the settings of `fresh` and keeps the estimate. States are rescaled to its sample
   /// time, and a change of b0 is moved into the disturbance, dhat += (b0_old - b0_new) u, so that
   /// the control does not jump. A law goes on with its memory, if it declares that it can.
   Check<S> adopt(const PredictorCorrector& fresh) {

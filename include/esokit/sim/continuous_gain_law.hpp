@@ -132,8 +132,8 @@ class ContinuousNonlinearGain {
   detail::LimitedGain<S, Shape> factor_;
 };
 
-/// Falling-bandwidth gain of the continuous observer: L_j(t) = C(N,j) P_j(t). Here P_0 = 1, P_{j+1}
-/// = (lambda + N q v) P_j + q v (1 + v) dP_j/dv, v = 1 / (e^{qt} - 1).
+/// Falling-bandwidth gain of the continuous observer: L_j(t) = C(N,j) P_j(t). Here P_0 = 1 and
+/// P_{j+1} = (lambda + N q v) P_j + q v (1 + v) dP_j/dv, v = 1 / (e^{qt} - 1).
 template <int Size, Scalar S>
 class ContinuousAlgebraicGain {
  public:

@@ -18,9 +18,9 @@ struct ResponseSums {
   [[nodiscard]] double most(double low, double high) const;
 };
 
-/// The system x(k+1) = A x(k) + b w(k): sums over its impulse responses c A^k b to the end of time,
-/// the rest by a geometric series of a power of A whose norm is below a half. In double: the
-/// results are a millionth larger than computed.
+/// The system x(k+1) = A x(k) + b w(k): sums over its impulse responses c A^k b to the end of time.
+/// The rest follows from a geometric series of a power of A whose norm is below a half. In double:
+/// the results are a millionth larger than computed.
 class WorstCase {
  public:
   using Vector = std::vector<double>;  ///< a row, a column, or a matrix by rows

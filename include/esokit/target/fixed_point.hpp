@@ -24,7 +24,7 @@ struct FixedCode {
 
 namespace detail {
 
-/// Plays the lists of a design for its self-test.
+/// Runs the lists of a design for its self-test.
 class FixedPlayer {
  public:
   explicit FixedPlayer(const FixedDesign& design)
@@ -70,17 +70,17 @@ Expected<FixedCode, Error<double>> fixed_code(const RecordedDesign& recorded,
 /// Each state has a scale of its own, chosen so that nothing can overflow while y and u are within
 /// their declared ranges; a y outside is no measurement. What a shift leaves over is kept where the
 /// bound needs it, so that a slow observer at a high rate does not stall. Where samples are missing
-/// the states move in 64 bits and are held within their ranges, with a flag; after more than
-/// `max_gap()` samples the next good one restarts, also where the object bridges longer gaps.
+/// the states move in 64 bits and are held within their ranges, with a flag. After more than
+/// `max_gap()` samples the next valid one restarts, also where the object bridges longer gaps.
 ///
 /// The bounds are worst cases over all sequences of y and u within their ranges with a measurement
 /// at each sample: sums of the impulse responses from each rounding that is written to each
 /// estimate. After a gap they hold again as the state that it left decays.
 ///
-/// Written are observers whose update is linear (LinearEso, also with a set of poles, HalfGainEso,
-/// CascadeEso; AlgebraicEso once it has settled and the frozen ExtendedStateFilter, which restart
-/// after any gap with the gains of then) and Adrc around them up to order 2. A limit of rate may be
-/// below one count a sample.
+/// Written are observers whose update is linear and Adrc around them up to order 2: LinearEso, also
+/// with a set of poles, HalfGainEso and CascadeEso. Also AlgebraicEso once it has settled and the
+/// frozen ExtendedStateFilter, which restart after any gap with the gains of then. A limit of rate
+/// may be below one count a sample.
 ///
 /// With CodeOptions::settings_in_struct, gains and limits are in a struct, and `name_adopt` takes
 /// another one while it runs: CCode::settings of another design that was written with

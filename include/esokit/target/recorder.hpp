@@ -157,7 +157,7 @@ class Recorder {
   /// @param object as `make` returned it, or later; its state and settings are those recorded
   explicit Recorder(const Object& object) : object_(as_recorded(object)) {}
 
-  /// Adds a call of which every good sample consists. It must leave all that is no number
+  /// Adds a call of which every valid sample consists. It must leave all that is no number
   /// (counters, modes) as it was, perhaps after some calls (the place in a ring): then each has a
   /// list.
   /// @param arguments how many arguments it has @param call calls the object

@@ -57,7 +57,7 @@ template <class Observer>
 inline constexpr bool is_adapter =
     IsDelayed<Observer>::value || IsGate<Observer>::value || IsWrapped<Observer>::value ||
     IsGuarded<Observer>::value || IsMeasured<Observer>::value || IsMapped<Observer>::value;
-/// Told at one place, and inside a WrappedOutput: around it the angle is read otherwise.
+/// Said at one place, and inside a WrappedOutput: around it the angle is read otherwise.
 template <class Observer>
 inline constexpr bool measures_plainly = [] {
   if constexpr (IsMeasured<Observer>::value) {

@@ -27,7 +27,7 @@ namespace esokit::detail {
 [[nodiscard]] int wrong_place(const std::string& name);
 
 /// Whether a comment leaves the one in which it stands: by a mark, also one that is put together by
-/// a line that goes on, which a backslash or its trigraph at the end of a line says.
+/// a continued line. Such a line has a backslash or its trigraph at its end.
 [[nodiscard]] bool leaves_comment(const std::string& comment);
 
 /// Headers of C99, C11 and C23: of the same name, `name.h` would be taken for one.
