@@ -9,10 +9,12 @@
 // symbol    code            value            unit
 // n         order           1, 2             -
 // T         sample_time     0.001            s
-// w_k       -               30               rad/s, bandwidth of the Kalman filter: (q / (R T))^(1
-// / (2 (n + 1))) w_r       -               w_k / 8 .. 2 w_k rad/s, bandwidth of the LQG law: rho =
-// w_r^(-2n) tau       lag             0.01             s, in one case
-//           swing           5                rad/s, amplitude 3 q^(1/2), in one case
+// w_k       -               30               rad/s, bandwidth of the Kalman filter
+// w_r       -               w_k / 8 .. 2 w_k rad/s, bandwidth of the LQG law: rho = w_r^(-2n)
+// tau       lag             0.01             s, in one case
+//           sinusoids       5                rad/s, amplitude 3 q^(1/2), in one case
+//
+// w_k = (q / (R T))^(1 / (2 (n + 1)))
 
 #include <algorithm>
 #include <array>

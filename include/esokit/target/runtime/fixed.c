@@ -5,8 +5,8 @@ R"esokit("
 #include DESIGN_HEADER
 
 /* Deviations from MISRA C:2012: negative numbers are shifted right (10.1), which the next line makes
- * sure goes towards minus infinity; its type is not used (2.3, advisory); functions leave early where
- * a sample is refused (15.5, advisory); a header has macros that its source may not need (2.5,
+ * sure goes towards minus infinity. Its type is not used (2.3, advisory). Functions leave early where
+ * a sample is refused (15.5, advisory). A header has macros that its source may not need (2.5,
  * advisory). */
 typedef char esokit_shifts_negative_numbers[(((-1) >> 1) == -1) ? 1 : -1];
 

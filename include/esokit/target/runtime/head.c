@@ -9,8 +9,8 @@ R"esokit("
 #include <string.h>
 
 /* Deviations from MISRA C:2012: is_finite looks at the bits of a number by memcpy (21.15), as no
- * test of its value holds under -ffast-math; functions leave early where a sample is refused (15.5,
- * advisory); a header has macros that its source may not need (2.5, advisory). */
+ * test of its value holds under -ffast-math. Functions leave early where a sample is refused (15.5,
+ * advisory). A header has macros that its source may not need (2.5, advisory). */
 
 DESIGN_CONSTANTS
 /* By its bits, so that it holds under -ffast-math, too. */
