@@ -18,7 +18,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <string>
 #include <vector>
 
@@ -27,51 +26,13 @@
 #include "choosing/overload.hpp"
 #include "common/parallel.hpp"
 #include "common/report.hpp"
-#include "from_log/parts/paste.hpp"
+#include "from_log/settling.hpp"
 
 using namespace esokit::examples;
+using from_log::Machine;
+using from_log::Settling;
 
 namespace {
-
-/// A plant, and how wrong its model is.
-struct Settling {
-  esokit::TuneModel model{};
-  double pole = 0, gain = 0, lag = 0;  ///< of the plant
-  std::size_t late = 0;                ///< samples of its dead time
-  double y = 0, u = 0;                 ///< where it rests
-  double step = 0;                     ///< of r
-};
-
-Settling random_plant(int order, overload_example::Dice& random) {
-  Settling all;
-  auto& m = all.model;
-  const auto logarithmic = [&](double low, double high) {
-    return std::exp(random.between(std::log(low), std::log(high)));
-  };
-  const bool one_sided = order == 1 && random.with(0.5);
-  m.order = order;
-  m.sample_time = 1;
-  m.pole = 1 / logarithmic(30, 1500);
-  m.lag = random.with(0.3) ? 0 : logarithmic(0.5, 0.15 / m.pole);
-  m.dead_time = std::floor(random.between(0, 8));
-  // The range of u moves y by 100, or y' by 1.
-  m.input_gain = {order == 1 ? m.pole : 0.01 * m.pole, 0};
-  m.input_gain.half_width = 0.08 * m.input_gain.value;
-  m.latency_half_width = 0.1 * (m.lag + m.dead_time);
-  m.noise = logarithmic(0.005, 0.3) * (order == 1 ? 1 : 0.1);
-  m.disturbance = m.disturbance_of(logarithmic(0.002, 0.1) / (1 + 0.2 * (m.dead_time + m.lag)));
-  m.u_min = one_sided ? 0 : -50;
-  m.u_max = one_sided ? 100 : 50;
-  all.y = one_sided ? 20 : 0;
-  all.step = logarithmic(3, order == 1 ? 45 : 30);
-  const double late = random.between(-0.15, 0.15);
-  all.pole = m.pole * random.between(0.8, 1.2);
-  all.gain = m.input_gain.value * random.between(0.92, 1.08);
-  all.lag = m.lag * (1 + late);
-  all.late = static_cast<std::size_t>(std::lround(m.dead_time * (1 + late)));
-  all.u = order == 1 ? all.pole * all.y / all.gain : 0;
-  return all;
-}
 
 struct Answer {
   double settling = 0, overshoot = 0, peak = 0, area = 0;
@@ -80,27 +41,12 @@ struct Answer {
 /// @param load of y^(n), from the beginning on
 template <class Control>
 Answer answer_of(const Settling& plant, double step, double load, Control control) {
-  std::deque<double> line(plant.late, plant.u);
-  double y = plant.y, rate = 0, v = plant.u;
+  Machine machine(plant, load);
   const int rows = static_cast<int>(6000 + 20 / plant.pole);
   Answer answer;
   for (int k = 0; k < rows; ++k) {
-    line.push_back(control(y, plant.y + step));
-    const double u = line.front();
-    line.pop_front();
-    constexpr int parts = 20;
-    constexpr double h = 1.0 / parts;
-    for (int i = 0; i < parts; ++i) {
-      v = plant.lag > 0 ? v - std::expm1(-h / plant.lag) * (u - v) : u;
-      if (plant.model.order == 1) {
-        y += h * (plant.gain * v - plant.pole * y + load);
-      } else {
-        const double change = plant.gain * v - plant.pole * rate + load;
-        y += h * (rate + 0.5 * h * change);
-        rate += h * change;
-      }
-    }
-    const double error = y - plant.y - step;
+    machine.update(control(machine.measured(), plant.y + step));
+    const double error = machine.y() - plant.y - step;
     if (step > 0 && std::abs(error) > 0.02 * step) answer.settling = k + 2;
     if (step > 0) answer.overshoot = std::max(answer.overshoot, error / step);
     answer.peak = std::max(answer.peak, std::abs(error));
@@ -116,21 +62,15 @@ struct Ratios {
   double overshoot = 0, their_overshoot = 0;  ///< shares of the step
 };
 
-Ratios compared(int order, std::uint64_t seed) {
+Ratios compared(int order, bool encoder, std::uint64_t seed) {
   overload_example::Dice random(seed);
-  const Settling plant = random_plant(order, random);
+  Settling plant = from_log::random_plant(order, random);
+  if (encoder) plant.count = std::sqrt(12.0) * plant.model.noise;
   const auto tuning = esokit::tune(plant.model, {}, {.simulate = esokit::TuneSimulation::none});
   if (!tuning || !tuning->designs.front().feasible) return {};
   const esokit::TunedDesign& design = tuning->designs.front();
   const double half = 0.5 * (plant.model.u_max - plant.model.u_min);
-  from_log::Pasting pasting;
-  pasting.order = order;
-  pasting.input_gain = plant.model.input_gain.value;
-  pasting.pole = plant.model.pole;
-  pasting.dead_time = plant.model.dead_time;
-  pasting.room = half * pasting.input_gain;
-  pasting.shortest = 4 * plant.model.latency();
-  pasting.pole_reach = 2 * half;
+  const from_log::Pasting pasting = from_log::pasting_of(plant);
   const auto ours = [&](double step, double load) {
     from_log::Runner runner(pasting, *tuning, design);
     runner.start(plant.y, plant.u);
@@ -169,10 +109,17 @@ int main(int argc, char** argv) {
            "same noise in u.",
        .order = 3});
   std::vector<CsvRow> rows;
-  for (const int order : {1, 2}) {
-    const std::string name = "order " + std::to_string(order);
+  struct Group {
+    const char* name;
+    int order;
+    bool encoder;
+  };
+  for (const Group& group : {Group{"order 1", 1, false}, Group{"order 2", 2, false},
+                             Group{"order 2 with an encoder", 2, true}}) {
+    const std::string name = group.name;
     const auto all = run_parallel(name, count, [&](std::size_t i) {
-      return compared(order, (seed << 32u) + 1'000'003u * i + static_cast<std::uint64_t>(order));
+      return compared(group.order, group.encoder,
+                      (seed << 32u) + 1'000'003u * i + static_cast<std::uint64_t>(group.order));
     });
     const auto part = [&](double Ratios::*member, double share) {
       std::vector<double> values;

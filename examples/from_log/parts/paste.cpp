@@ -82,17 +82,6 @@ double checked_w(const Feed& feed, int k) {
   return k < w_moves || k >= w_back ? feed.rest : printed(feed.rest + feed.swing);
 }
 
-/// What the code watches, from the log and from what was simulated.
-struct Watch {
-  double threshold = 0;  ///< a larger innovation is an outlier, unit of y
-  double bound = 0;      ///< of dhat, unit of y^(n)
-  bool guarded = false;  ///< the design is proven with a bound
-  double bandwidth = 0;  ///< of the observer, rad/s
-  double noise = 0;      ///< that makes the innovations of the log, unit of y
-  double memory = 0;     ///< s
-  int divider = 1;
-};
-
 /// Whether `Guarded` proves an observer with these gains with the bound. What it computes for a
 /// chain is asked of each level, as its type for each kind of observer takes long to compile. With
 /// a slope of d there is nothing to prove.
@@ -128,6 +117,8 @@ bool certified(const TuneModel& model, const TunedDesign& design, double bound) 
   }
   return true;
 }
+
+}  // namespace
 
 Watch watch_of(const Tuning& tuning, const TunedDesign& design, const esokit::FitData& rows) {
   const TuneModel& model = tuning.model;
@@ -199,6 +190,8 @@ Watch watch_of(const Tuning& tuning, const TunedDesign& design, const esokit::Fi
   watch.noise = printed(rms / std::max(by_noise, 1e-9));
   return watch;
 }
+
+namespace {
 
 /// What the code of a design includes.
 std::string includes_of(const std::string& code) {

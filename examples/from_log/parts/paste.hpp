@@ -158,14 +158,14 @@ class Runner {
   /// (r, r', ..) of the last sample.
   [[nodiscard]] const std::array<double, 5>& motion() const { return motion_; }
 
- private:
   using Profile =
       std::variant<esokit::ApproachProfile<1, most_delay>, esokit::ApproachProfile<2, most_delay>,
                    esokit::SmoothProfile<2>, esokit::SmoothProfile<3>, esokit::SmoothProfile<4>>;
-
+  /// @param gains of the law
   [[nodiscard]] static Profile profile_of(const Pasting& pasting, const esokit::TuneModel& model,
                                           int gains);
 
+ private:
   const Pasting* pasting_;
   esokit::LinearController form_;
   Profile profile_;
@@ -199,6 +199,20 @@ struct Acting {
 [[nodiscard]] StepOfCode step_of_pid(const Pasting& pasting, const esokit::TuneModel& model,
                                      const esokit::PlainPidConfig& config, double height,
                                      double duration);
+
+/// What the code watches, from the log and from what was simulated.
+struct Watch {
+  double threshold = 0;  ///< a larger innovation is an outlier, unit of y
+  double bound = 0;      ///< of dhat, unit of y^(n)
+  bool guarded = false;  ///< the design is proven with a bound
+  double bandwidth = 0;  ///< of the observer, rad/s
+  double noise = 0;      ///< that makes the innovations of the log, unit of y
+  double memory = 0;     ///< s
+  int divider = 1;
+};
+
+[[nodiscard]] Watch watch_of(const esokit::Tuning& tuning, const esokit::TunedDesign& design,
+                             const esokit::FitData& rows);
 
 /// C++ that compiles as it is. @param rows the log, as of `told_rows`
 [[nodiscard]] std::string pasted_code(const Pasting& pasting, const esokit::Tuning& tuning,
