@@ -15,6 +15,7 @@
 // --count N, --seed S: so many plants of each order, other ones.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -62,10 +63,10 @@ struct Ratios {
   double overshoot = 0, their_overshoot = 0;  ///< shares of the step
 };
 
-Ratios compared(int order, bool encoder, std::uint64_t seed) {
+/// @return measured by a number, and by an encoder whose steps make the noise of the model
+std::array<Ratios, 2> compared(int order, std::uint64_t seed) {
   overload_example::Dice random(seed);
   Settling plant = from_log::random_plant(order, random);
-  if (encoder) plant.count = std::sqrt(12.0) * plant.model.noise;
   const auto tuning = esokit::tune(plant.model, {}, {.simulate = esokit::TuneSimulation::none});
   if (!tuning || !tuning->designs.front().feasible) return {};
   const esokit::TunedDesign& design = tuning->designs.front();
@@ -82,14 +83,21 @@ Ratios compared(int order, bool encoder, std::uint64_t seed) {
     return answer_of(plant, step, load, [&](double y, double r) { return pid.update(y, r); });
   };
   const double load = 0.2 * half * pasting.input_gain;
-  const Answer moved = ours(plant.step, 0), reference = theirs(plant.step, 0);
-  const Answer loaded = ours(0, load), held = theirs(0, load);
-  return {.designed = true,
-          .settling = moved.settling / reference.settling,
-          .peak = loaded.peak / held.peak,
-          .area = loaded.area / held.area,
-          .overshoot = moved.overshoot,
-          .their_overshoot = reference.overshoot};
+  const auto ratios = [&] {
+    const Answer moved = ours(plant.step, 0), reference = theirs(plant.step, 0);
+    const Answer loaded = ours(0, load), held = theirs(0, load);
+    return Ratios{.designed = true,
+                  .settling = moved.settling / reference.settling,
+                  .peak = loaded.peak / held.peak,
+                  .area = loaded.area / held.area,
+                  .overshoot = moved.overshoot,
+                  .their_overshoot = reference.overshoot};
+  };
+  std::array<Ratios, 2> all{ratios(), {}};
+  if (order == 1) return all;
+  plant.count = std::sqrt(12.0) * plant.model.noise;
+  all[1] = ratios();
+  return all;
 }
 
 }  // namespace
@@ -109,18 +117,24 @@ int main(int argc, char** argv) {
            "same noise in u.",
        .order = 3});
   std::vector<CsvRow> rows;
+  std::array<std::vector<std::array<Ratios, 2>>, 2> of_order;
+  for (const int order : {1, 2}) {
+    of_order[static_cast<std::size_t>(order - 1)] =
+        run_parallel("order " + std::to_string(order), count, [&](std::size_t i) {
+          return compared(order,
+                          (seed << 32u) + 1'000'003u * i + static_cast<std::uint64_t>(order));
+        });
+  }
   struct Group {
     const char* name;
-    int order;
-    bool encoder;
+    std::size_t order;
+    std::size_t measured;
   };
-  for (const Group& group : {Group{"order 1", 1, false}, Group{"order 2", 2, false},
-                             Group{"order 2 with an encoder", 2, true}}) {
+  for (const Group& group :
+       {Group{"order 1", 1, 0}, Group{"order 2", 2, 0}, Group{"order 2 with an encoder", 2, 1}}) {
     const std::string name = group.name;
-    const auto all = run_parallel(name, count, [&](std::size_t i) {
-      return compared(group.order, group.encoder,
-                      (seed << 32u) + 1'000'003u * i + static_cast<std::uint64_t>(group.order));
-    });
+    std::vector<Ratios> all;
+    for (const auto& both : of_order[group.order - 1]) all.push_back(both[group.measured]);
     const auto part = [&](double Ratios::*member, double share) {
       std::vector<double> values;
       for (const Ratios& one : all) {
