@@ -24,7 +24,8 @@ enum class StepStatus : std::uint16_t {
   gap_bridged = 8,
   /// More samples than `longest_gap()` were missing, or more than `max_gap()` while corrections
   /// were due after another long gap (`recovering()`), or the state could not be predicted: the
-  /// observer was restarted as by reset(y).
+  /// observer was restarted as by reset(y). A controller then sets it to rest at y under the
+  /// present u, so that u does not jump.
   restarted = 16,
   /// The state given to a reset was not finite, or its angle was too large to determine its turn:
   /// nothing was changed.

@@ -157,7 +157,9 @@ class ObservedLevels {
   }
 
   /// Missing samples that any correction bridges: the config's number, or fewer if errors would not
-  /// decay in every sequence of gaps up to it.
+  /// decay in every sequence of gaps up to it. After more, a gain that is not constant
+  /// (AlgebraicEso, the filters, AdjustableBandwidthEso, NonlinearEso) restarts, and so do Guarded,
+  /// VariableTime and what is written in integers. A constant gain may go on, see `longest_gap`.
   [[nodiscard]] constexpr int max_gap() const noexcept { return max_gap_; }
 
   /// Missing samples that a correction bridges if no other is due, see `recovering`; after more it
