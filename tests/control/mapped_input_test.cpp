@@ -382,6 +382,23 @@ TEST(MappedInput, BearsADeadZoneThatIsNotAsConfigured) {
   EXPECT_LT(more, 11);
 }
 
+/// What is missing of a dead zone is a limit cycle of the observer's integrator: a leak of it ends
+/// the large ones.
+TEST(MappedInput, WithALeakHuntsByCountsOnly) {
+  using Eso = MappedInput<Guarded<AxisEso>>;
+  const auto leaking =
+      Adrc<Eso>::make({.observer = {.observer = {.observer = axis_observer, .leak_time = 0.3},
+                                    .curve = Curve::dead_zone(3)},
+                       .controller_bandwidth = 20,
+                       .limits = {.lower = -12, .upper = 12}})
+          .value();
+  Random random(68);
+  for (int i = 0; i < 100; i += stride) {
+    const Axis axis{.dead = random.uniform(0, 3.6)};
+    EXPECT_LT(hunts(axis, leaking), 3.5) << axis.dead;
+  }
+}
+
 // ---- Two gains, and curves that are wrong by 20 %.
 
 /// rms of the error of a loop y' = effect + d under steps of r and d, with the real curve.

@@ -38,7 +38,8 @@ std::array<std::string, 2> c_of_order(const Settings& s) {
 
 std::array<std::string, 2> c_of(const Settings& s) {
   const bool delayed = s[knows_dead_time] > 0.0 && s[dead_time] > 0.5 * s[sample_time];
-  if (delayed || (s[observer] != 0.0 && s[observer] != 2.0)) return {};
+  const bool mapped = s[knows_curve] > 0.0 && (s[dead_zone] > 0.0 || s[down_gain] != 1.0);
+  if (delayed || mapped || (s[observer] != 0.0 && s[observer] != 2.0)) return {};
   return s[order] == 1.0 ? c_of_order<1>(s) : s[order] == 2.0 ? c_of_order<2>(s) : c_of_order<3>(s);
 }
 

@@ -77,7 +77,13 @@ void take_over(const from_log::Outcome& outcome, LogResult& result) {
       exactly("law", i, gains[i] / std::pow(slow, count - static_cast<double>(i)));
   }
   set("soften", taken->settings.soften ? 2 : 1);
-  set("limit", half);
+  const esokit::SeenCurve& curve = outcome.findings.curve;
+  const bool dead = curve.kind == esokit::CurveKind::dead_zone;
+  if (dead) {
+    set("dead_zone", curve.size.value);
+    set("knows_curve", 1);
+  }
+  set("limit", half + (dead ? curve.size.value : 0.0));
   set("sample_time", model.sample_time);
   // So that u may be at its limit for a moment, and in whole settling times.
   const double power = std::pow(slow, model.order + (taken->knows.lag ? 1 : 0));
@@ -95,6 +101,8 @@ void take_over(const from_log::Outcome& outcome, LogResult& result) {
                     esokit::examples::number_text(100 * (1.0 - chosen.excess / taken->excess), 2) +
                     " % smaller.";
   }
+  if (curve.kind == esokit::CurveKind::square)
+    result.taken += " The actuator acts as a square: there, u is its effect.";
   if (model.input_gain.value < 0.0) result.taken += " b0 is negative: there, u has the other sign.";
   if (model.u_max + model.u_min != 0.0)
     result.taken += " Its limits lie symmetrically, u counts from their middle.";

@@ -5,6 +5,7 @@
 #include <complex>
 #include <cstdio>
 #include <cstdlib>
+#include <esokit/adapter/actuator_map.hpp>
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/analysis/delay_margin.hpp>
 #include <esokit/analysis/loop_noise.hpp>
@@ -54,6 +55,10 @@ constexpr std::array<Field, field_count> all_fields{{
      "1: it does not oscillate"},
     {"friction", "dry friction", "y\u207d\u207f\u207e", "Machine", Kind::number_or_none, 1e-3, 1e4,
      0, "", "as large at any speed, against it"},
+    {"dead_zone", "dead zone of the actuator", "u", "Machine", Kind::number_or_none, 1e-3, 1e4, 0,
+     "", "less u does nothing, and more acts so much less"},
+    {"down_gain", "its gain downwards / upwards", "", "Machine", Kind::number, 0.05, 20, 1, "",
+     "a cooler and a heater, a lift"},
     {"load", "load", "y\u207d\u207f\u207e", "Machine", Kind::number_or_none, 1e-3, 1e5, 20, "",
      "pulls y down from the middle of the run on"},
     {"noise", "noise of the sensor", "y", "Machine", Kind::number_or_none, 1e-6, 10, 1e-4, "",
@@ -72,6 +77,8 @@ constexpr std::array<Field, field_count> all_fields{{
      "1: it knows b\u2080"},
     {"knows_dead_time", "knows the dead time", "", "Controller", Kind::on_off, 0, 1, 0, "",
      "DelayedInput, whole samples"},
+    {"knows_curve", "knows dead zone and gains", "", "Controller", Kind::on_off, 0, 1, 0, "",
+     "MappedInput, the curve of the actuator"},
     {"limit", "limit of u, \u00b1", "u", "Controller", Kind::number, 1e-3, 1e5, 5, "",
      "what the actuator can give, and the controller knows"},
     {"rate", "limit of its rate", "u/s", "Controller", Kind::number_or_none, 1e-2, 1e6, 0, "",
@@ -179,6 +186,33 @@ Expected<Machine, Error<double>> machine_for(const Settings& s) {
   return behind_lag(with_resonance(*plain, s[resonance], s[resonance_damping]));
 }
 
+// What the actuator makes of u.
+double effect_of(const Settings& s, double u) {
+  const double left = std::copysign(std::max(std::abs(u) - s[dead_zone], 0.0), u);
+  return u < 0.0 ? s[down_gain] * left : left;
+}
+
+bool maps(const Settings& s) {
+  return s[knows_curve] > 0.0 && (s[dead_zone] > 0.0 || s[down_gain] != 1.0);
+}
+
+// As the controller knows it. Two gains in one with a dead zone are its table.
+using ActuatorCurve = esokit::ActuatorCurve<double, 3>;
+ActuatorCurve curve_of(const Settings& s) {
+  if (!maps(s)) return {};
+  if (!(s[dead_zone] > 0.0)) return ActuatorCurve::two_gains(1.0, s[down_gain]);
+  auto curve = ActuatorCurve::dead_zone(s[dead_zone]);
+  curve.effect[0] *= s[down_gain];
+  curve.slope_below = s[down_gain];
+  return curve;
+}
+
+// Of the law, which asks for an effect where the curve is known: the map is behind it, as in
+// MappedInput, but once for all types.
+double limit_of(const Settings& s, double sign) {
+  return maps(s) ? effect_of(s, sign * s[limit]) : sign * s[limit];
+}
+
 // ---- the controller ----
 
 // Any controller, so that each machine is run with one type.
@@ -247,8 +281,8 @@ AnyMade made(const Settings& s, const typename Observer::Config& observer) {
     config.controller_bandwidth = s[controller_bandwidth];
   }
   if (s[soften] > 0.0) config.soften = s[soften] > 1.0;
-  config.limits.lower = -s[limit];
-  config.limits.upper = s[limit];
+  config.limits.lower = limit_of(s, -1.0);
+  config.limits.upper = limit_of(s, 1.0);
   if (s[rate] > 0.0) config.limits.rate = s[rate];
   const auto controller = esokit::Adrc<Observer>::make(config);
   if (!controller) return controller.error();
@@ -349,13 +383,17 @@ Outcome run_one(const Settings& s, const Plant<6>& plant, double step, AnyContro
   std::vector<double> sent(late + 1, 0.0);
   const double told = known_gain(s);
   double settled = 0.0;
+  const auto map = esokit::ActuatorMap<double, 3>::make(curve_of(s));
+  if (!map) return map.error();
+  double asked = 0.0;  // u, where the plant has its effect
   const std::function<double(double, double)> update = [&](double y, double r) {
-    return controller.update(y, r);
+    asked = map->input(controller.update(y, r));
+    return effect_of(s, asked);
   };
   const auto end = esokit::sim::run(plant, update, config, [&](const auto& sample) {
     k = static_cast<long>(sample.index) + 1;
     speed = sample.state(top);
-    const double y = sample.output, u = sample.input, t = sample.t;
+    const double y = sample.output, u = asked, t = sample.t;
     trace.y->push_back(y);
     trace.u->push_back(u);
     if (!std::isfinite(sample.measurement)) numbers[refused] += 1.0;
@@ -368,17 +406,20 @@ Outcome run_one(const Settings& s, const Plant<6>& plant, double step, AnyContro
       numbers[load_area] += error * T;
     }
     numbers[largest_input] = std::max(numbers[largest_input], std::abs(u));
-    if (std::abs(u) >= s[limit]) numbers[at_limit] += 1.0 / static_cast<double>(count);
+    // Behind a map to rounding.
+    if (std::abs(u) >= s[limit] * (1.0 - 1e-12))
+      numbers[at_limit] += 1.0 / static_cast<double>(count);
     if (trace.t == nullptr) return;
-    sent[static_cast<std::size_t>(sample.index) % (late + 1)] = u;
+    sent[static_cast<std::size_t>(sample.index) % (late + 1)] = sample.input;
     const double arrives = sent[static_cast<std::size_t>(sample.index + 1) % (late + 1)];
     esokit::Vector<double, 1> in, of;
-    in(0) = late == 0 ? u : arrives;
+    in(0) = late == 0 ? sample.input : arrives;
     of(0) = disturbance_of(k > loaded);
     trace.t->push_back(t);
     trace.r->push_back(step);
     trace.measured->push_back(sample.measurement);
-    trace.d->push_back(plant.derivative(sample.state, in, of)(top) - told * u);
+    trace.d->push_back(plant.derivative(sample.state, in, of)(top) -
+                       told * (maps(s) ? sample.input : u));
     trace.found->push_back(controller.estimate());
   });
   if (!end) return end.error();
@@ -461,8 +502,8 @@ Expected<esokit::PlainPidConfig, Error<double>> pid_of(const Settings& s, double
   // As large a kick of u by a step as that of the ADRC.
   pid.reference_weight =
       std::pow(s[controller_bandwidth], Order) / (known_gain(s) * pid.proportional);
-  pid.lower = -s[limit];
-  pid.upper = s[limit];
+  pid.lower = limit_of(s, -1.0);
+  pid.upper = limit_of(s, 1.0);
   pid.sample_time = s[sample_time];
   return pid;
 }
@@ -614,8 +655,23 @@ std::string code_of(const Settings& s, double step) {
     config = "{.observer = " + config +
              ", .delay = " + text_of(std::round(s[dead_time] / s[sample_time])) + "}";
   }
+  if (maps(s)) {
+    const ActuatorCurve curve = curve_of(s);
+    std::string points;
+    if (curve.points == 3) {
+      points = ".input = {{" + text_of(curve.input[0]) + ", 0, " + text_of(curve.input[2]) +
+               "}}, .effect = {{" + text_of(curve.effect[0]) + ", 0, " + text_of(curve.effect[2]) +
+               "}}, .points = 3, ";
+    } else {
+      points = ".points = 1, ";
+    }
+    type = "esokit::MappedInput<" + type + ", 3>";
+    config = "{.observer = " + config + ", .curve = {" + points +
+             ".slope_below = " + text_of(curve.slope_below) + "}}";
+  }
   std::string text = "#include <cstdio>\n";
   if (delayed) text += "#include <esokit/adapter/delayed_input.hpp>\n";
+  if (maps(s)) text += "#include <esokit/adapter/mapped_input.hpp>\n";
   if (poles_of_log(s)) text += "#include <esokit/gain/pole_set.hpp>\n";
   text += "#include <esokit/control/adrc.hpp>\n#include <esokit/observer/" + std::string(header) +
           ".hpp>\n\nint main() {\n  using Observer = " + type +
@@ -650,6 +706,9 @@ Outcome within_reason(const Settings& s) {
   }
   if (!(s[samples] >= 100.0 && s[samples] <= 20000.0 && s[samples] == std::floor(s[samples])))
     return Error<double>{"samples", s[samples], "must be a whole number, 100 .. 20000"};
+  if (maps(s) && s[rate] > 0.0)
+    return Error<double>{"rate", s[rate], "is played without a curve that is known only: must be",
+                         -1,     0.0,     true};
   if (!(s[dead_time] <= 900.0 * s[sample_time]))
     return Error<double>{"dead_time", s[dead_time], "must not be above 900 sample times"};
   return {};
