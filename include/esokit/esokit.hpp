@@ -199,6 +199,7 @@
 #include <esokit/sim/window.hpp>
 #include <esokit/target/c_code.hpp>
 #include <esokit/target/c_design.hpp>
+#include <esokit/target/design_text.hpp>
 #include <esokit/target/fixed_bounds.hpp>
 #include <esokit/target/fixed_builder.hpp>
 #include <esokit/target/fixed_design.hpp>

@@ -197,7 +197,9 @@ TEST(Runtime, IsStructuredText) {
   std::set<std::string> missing;
   for (const char* file : detail::runtime::source) missing.merge(functions_of(file, "esokit_"));
   EXPECT_GT(missing.size(), 90U);
-  missing.erase("esokit_self_test");
+  for (const char* in_c_alone : {"save", "load", "crc_of", "pass_sample"}) {
+    missing.erase(in_c_alone);
+  }
   Random random(64);
   for (int k = 0; k < 400; ++k) {
     const detail::RecordedDesign design = design_of(random);

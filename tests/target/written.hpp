@@ -279,7 +279,11 @@ class InC {
                              "unsigned loop_probe(const loop_state *o);\n"
                              "unsigned loop_probe(const loop_state *o) { return ") +
                      (is_controller ? "o->status + 512u * o->mode + " : "") +
-                     "65536u * o->gap; }\n",
+                     "65536u * o->gap; }\n" +
+                     (code.header.find("loop_saved;") == std::string::npos
+                          ? ""
+                          : "unsigned loop_saved_size(void);\n"
+                            "unsigned loop_saved_size(void) { return sizeof(loop_saved); }\n"),
                  compiler) {
     if (!loaded()) return;
     const auto find = [this](auto& function, const char* name) { library_.find(function, name); };
@@ -312,6 +316,12 @@ class InC {
       if (library_.has("loop_set_input_gain")) find(gain_, "loop_set_input_gain");
     }
     unsigned (*bytes)() = nullptr;
+    if (library_.has("loop_save")) {
+      find(save_, "loop_save");
+      find(load_, "loop_load");
+      find(bytes, "loop_saved_size");
+      saved_size_ = bytes();
+    }
     find(bytes, "loop_size");
     state_.resize(bytes() / sizeof(std::uint64_t) + 1);
     init_(state_.data());
@@ -340,6 +350,14 @@ class InC {
   /// status + 512 mode + 65536 gap
   unsigned probe() { return probe_(state_.data()); }
   int self_test(V tolerance) { return self_test_(tolerance); }
+  [[nodiscard]] std::vector<std::uint64_t> save() const {
+    std::vector<std::uint64_t> saved(saved_size_ / sizeof(std::uint64_t) + 1);
+    save_(state_.data(), saved.data());
+    return saved;
+  }
+  bool load(const std::vector<std::uint64_t>& saved, std::uint32_t samples, V u) {
+    return load_(state_.data(), saved.data(), samples, u);
+  }
   /// Its bytes: a copy of them may be put back.
   std::vector<std::uint64_t>& state() { return state_; }
 
@@ -367,6 +385,9 @@ class InC {
   V (*estimate_)(void*, unsigned) = nullptr;
   unsigned (*probe_)(const void*) = nullptr;
   int (*self_test_)(V) = nullptr;
+  void (*save_)(const void*, void*) = nullptr;
+  bool (*load_)(void*, const void*, std::uint32_t, V) = nullptr;
+  unsigned saved_size_ = 0;
 };
 
 /// What the environment asks for instead of what a test does: ESOKIT_WRITTEN_SAMPLES of each kind,

@@ -40,6 +40,7 @@
 #include <esokit/sim/impl/statistics.ipp>
 #include <esokit/sim/impl/study_records.ipp>
 #include <esokit/target/impl/c_code.ipp>
+#include <esokit/target/impl/design_text.ipp>
 #include <esokit/target/impl/fixed_bounds.ipp>
 #include <esokit/target/impl/fixed_builder.ipp>
 #include <esokit/target/impl/fixed_design.ipp>

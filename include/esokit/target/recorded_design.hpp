@@ -506,6 +506,10 @@ Expected<RecordedDesign, Error<typename C::scalar_type>> recorded_design(
     return Error<V>{"soften", V(1), "is not written for a controller around MappedInput"};
   }
 
+  if constexpr (requires { controller.gains(); }) {
+    for (const V& k : controller.gains()) design.law_gains.push_back(static_cast<double>(k));
+  }
+
   if (auto ok = record_controller(maker); !ok) return ok.error();
   if (design.error_based) design.input_gain = -design.input_gain;
   take_samples(design, controller);
@@ -545,8 +549,10 @@ Expected<RecordedDesign, Error<typename C::scalar_type>> recorded_design(
   using Numbers = typename Maker::Numbers;
 
   Rules<V> rules = checked_options<V>(options);
-  rules.demand(!options.settings_in_struct, "settings_in_struct", V(1),
-               "is not written for PredictiveAdrc");
+  rules
+      .demand(!options.settings_in_struct, "settings_in_struct", V(1),
+              "is not written for PredictiveAdrc")
+      .demand(!options.saves_state, "saves_state", V(1), "is not written for PredictiveAdrc");
   if (!rules) return rules.error();
   Maker maker(controller, options);
   RecordedDesign& design = maker.design;

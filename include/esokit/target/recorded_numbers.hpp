@@ -28,6 +28,10 @@ struct CodeOptions {
   /// form, and PredictiveAdrc. Not in fixed point.
   bool moving_reference = false;
 
+  /// `name_save` and `name_load` for a state that is kept over a restart, with a CRC and the hash
+  /// of the design; in C, not for PredictiveAdrc.
+  bool saves_state = false;
+
   /// Gains, those of the law, and limits in a struct that can be changed while it runs, instead of
   /// constants: in C, for gains that do not depend on the innovation or the time.
   bool settings_in_struct = false;
@@ -182,6 +186,7 @@ struct RecordedDesign {
   std::string first_state{};           ///< the predicted measurement
   double sample_time = 0;
   double input_gain = 0;
+  std::vector<double> law_gains{};               ///< k_0, .. of a controller's own law
   std::vector<std::vector<double>> gap_gains{};  ///< all gains after 1, 2, .. samples
   bool gain_is_kept = true;    ///< without a gap they are the first row, else computed by the list
   std::vector<double> line{};  ///< of DelayedInput: the inputs, the newest last

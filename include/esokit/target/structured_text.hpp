@@ -77,6 +77,10 @@ StructuredText structured_text(const RecordedDesign& design);
 template <detail::Writable Object>
 Expected<std::string, Error<typename Object::scalar_type>> to_structured_text(
     const Object& object, const CodeOptions& options = {}) {
+  if (options.saves_state) {
+    return Error<typename Object::scalar_type>{
+        "saves_state", 1, "is not written in Structured Text: declare the block RETAIN there"};
+  }
   const auto design = detail::recorded_design(object, options);
   if (!design) return design.error();
   const auto new_names = detail::new_names_in_block<typename Object::scalar_type>(

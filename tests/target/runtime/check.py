@@ -27,7 +27,7 @@ GUARDS = [set(), {"GUARDED"}, {"GUARDED", "BOUNDED"}, {"GUARDED", "LEAKS"}, {"GU
           {"GUARDED", "BOUNDED", "BOUND_OF_U", "LEAKS"}]
 W = [set(), {"MEASURED", "ONE_W"}, {"MEASURED"}]
 FLAGS = OF_LOOPS + ["HOLDS_AT_START", "SETTINGS", "DELAYED", "GATED", "WRAPPED", "KNOWN", "MAPPED", "SINGLE",
-                    "RECOVERS", "MOVES"]
+                    "RECOVERS", "MOVES", "SAVED"]
 DEVIATIONS = ("2.5", "15.5", "21.15")
 ALL = sorted({*FLAGS, "GATED_ANGLE", "LAW_OF_ANGLE"}.union(*KINDS, *LAWS, *GUARDS, *W))
 
@@ -41,7 +41,7 @@ def valid(has):
          ({"STAYS_SAFE", "HOLDS_SAFE"} if "PREDICTIVE" in has else set()))
         or ("HOLDS_AT_START" in has and not loop and "PREDICTIVE" not in has)
         or ("PREDICTIVE" in has and (has & {"DELAYED", "GATED", "WRAPPED", "KNOWN", "MEASURED", "GUARDED",
-                                            "MAPPED", "SETTINGS"} or ("TABLE" in has and not kept)))
+                                            "MAPPED", "SETTINGS", "SAVED"} or ("TABLE" in has and not kept)))
         or ("GUARDED" in has and (not kept or "MEASURED" in has))
         or ("SETTINGS" in has and (not kept or "SOFTENS" in has))
         or ("RECOVERS" in has and "TABLE" not in has)

@@ -16,6 +16,7 @@ typedef double real;
 #endif
 
 #define DESIGN_ABOUT
+#define DESIGN_TEXT "a design"
 #define DESIGN_CONSTANTS
 #define DESIGN_MEMBERS \
   real z1; \
@@ -121,6 +122,7 @@ typedef double real;
 #define DELAY 3u
 #define LENGTH 4u
 #define DIVIDER 2u
+#define DESIGN_NUMBER 0x1234abcdu
 #define MISSING_LIMIT 10u
 #define HOLD_SAMPLES 13u
 #define FIRST_MODE 1u

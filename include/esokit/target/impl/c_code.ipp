@@ -4,8 +4,10 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <cstdio>
 #include <esokit/target/c_code.hpp>
 #include <esokit/target/c_design.hpp>
+#include <esokit/target/design_text.hpp>
 #include <esokit/target/list_writer.hpp>
 #include <esokit/target/recorded_design.hpp>
 #include <esokit/target/recorded_numbers.hpp>
@@ -66,9 +68,10 @@ inline std::string c_library_calls(const RecordedDesign& design) {
 /// What the C of a design has beside the files of target/runtime/: its features, numbers and lists.
 class CDesign {
  public:
-  /// @param mark of its text, if settings can be changed
-  CDesign(const RecordedDesign& design, const std::string& mark)
+  /// @param mark of its text, if settings can be changed @param hash see design_hash
+  CDesign(const RecordedDesign& design, const std::string& mark, const std::string& hash)
       : design_(design),
+        hash_(hash),
         writer_(c_language, design.single),
         text_(design.options.name, design.single) {
     writer_.members = design.members;
@@ -126,6 +129,7 @@ class CDesign {
     text_.feature("ESOKIT_WAITS", d.predictive && d.waits);
     text_.feature("ESOKIT_ERROR_BASED", d.error_based);
     text_.feature("ESOKIT_MOVES", d.options.moving_reference);
+    text_.feature("ESOKIT_SAVED", d.options.saves_state);
     text_.feature("ESOKIT_COMPENSATOR", d.compensates);
     text_.feature("ESOKIT_SOFTENS", d.softens);
     text_.feature("ESOKIT_DIVIDED", d.loop.divider > 1);
@@ -174,6 +178,7 @@ class CDesign {
     text_.constant("SAMPLES", std::to_string(d.samples.size()));
     text_.count("DIVIDER", static_cast<std::size_t>(d.loop.divider));
     text_.count("MISSING_LIMIT", d.loop.missing_limit);
+    text_.constant("DESIGN_NUMBER", hash_.empty() ? "0u" : "0x" + hash_ + "u");
     text_.count("HOLD_SAMPLES", d.predictive ? d.hold : d.loop.hold_left);
     const bool holds = d.predictive ? d.hold > 0 : d.loop.hold_left > 0;
     text_.feature("ESOKIT_HOLDS_AT_START", holds);
@@ -298,7 +303,9 @@ class CDesign {
     for (std::size_t i = 0; i < d.members.size(); ++i) {
       if (!d.live[i]) continue;
       const bool is_setting = !d.settings.empty() && d.settings[i];
-      (is_setting ? settings : members) += "  " + writer_.real() + " " + d.members[i] + ";\n";
+      const std::string scale = scale_text(d, i);
+      (is_setting ? settings : members) += "  " + writer_.real() + " " + d.members[i] + ";" +
+                                           (scale.empty() ? "" : " /* " + scale + " */") + "\n";
       if (!is_setting) set(d.members[i], writer_.number(d.numbers[i]));
     }
     set_adapters();
@@ -398,7 +405,13 @@ class CDesign {
     if (d.is_controller && !options.settings_in_struct) {
       about += ", u within " + writer_.number(d.lower) + " .. " + writer_.number(d.upper);
     }
-    text_.lines("DESIGN_ABOUT", about + ".\n");
+    const std::string structure = structure_text(d);
+    const std::string dynamics = options.settings_in_struct ? "" : dynamics_text(d);
+    text_.lines("DESIGN_ABOUT", about + ".\n * " + structure +
+                                    (dynamics.empty() ? "" : "\n * " + dynamics) + ".\n * Design " +
+                                    hash_ + ".\n");
+    text_.replace("DESIGN_TEXT", "\"" + structure + (dynamics.empty() ? "" : ", " + dynamics) +
+                                     ", design " + hash_ + "\"");
     const std::string calls = c_library_calls(d);
     text_.replace("DESIGN_EXACTLY",
                   d.known.on && !calls.empty()
@@ -452,8 +465,8 @@ class CDesign {
   }
   std::string settings(const std::string& mark) const {
     const CodeOptions& options = design_.options;
-    std::string set = "const " + options.name + "_settings " + options.name + "_" +
-                      options.settings_name + " = {\n  " + mark;
+    std::string set = "/* " + dynamics_text(design_) + " */\nconst " + options.name + "_settings " +
+                      options.name + "_" + options.settings_name + " = {\n  " + mark;
     for (std::size_t i = 0; i < design_.members.size(); ++i) {
       if (design_.live[i] && design_.settings[i]) {
         set += ",\n  " + writer_.number(design_.numbers[i]);
@@ -481,36 +494,54 @@ class CDesign {
   }
 
   const RecordedDesign& design_;
+  std::string hash_;
   ListWriter writer_;
   RuntimeText text_;
   std::string init_{};
   std::string settings_{};
 };
 
-/// The texts of a design. @param mark of its text, if settings can be changed
-inline CCode c_texts(const RecordedDesign& design, const std::string& mark) {
-  CDesign text(design, mark);
+/// The texts of a design. @param mark of its text, if settings can be changed @param hash of it
+inline CCode c_texts(const RecordedDesign& design, const std::string& mark,
+                     const std::string& hash) {
+  CDesign text(design, mark, hash);
   return {text.header(), text.source(), text.settings_file()};
 }
 
+/// Of all but its name, comment and self-test.
+inline std::uint32_t hash_of_texts(RecordedDesign design) {
+  design.samples.clear();
+  design.options.comment = {};
+  const CCode code = c_texts(design, "", "");
+  return hash_of(code.header + code.source);
+}
+
+/// Without what a struct of settings holds.
+inline RecordedDesign without_settings(RecordedDesign design) {
+  if (!design.options.settings_in_struct) return design;
+  for (double& number : design.numbers) number = 0;
+  for (auto& row : design.gap_gains) std::fill(row.begin(), row.end(), 0.0);
+  if (design.recovers) {  // what is due, and from which gap on, are settings, too
+    std::fill(design.recovery.begin(), design.recovery.end(), std::uint16_t{0});
+    design.max_gap = 0;
+  }
+  design.law_gains.clear();
+  design.options.settings_name = {};
+  return design;
+}
+
+ESOKIT_FUNCTION std::string design_hash(const RecordedDesign& design) {
+  RecordedDesign unnamed = without_settings(design);
+  unnamed.options.name = CodeOptions{}.name;
+  char digits[9];
+  std::snprintf(digits, sizeof digits, "%08x", static_cast<unsigned>(hash_of_texts(unnamed)));
+  return digits;
+}
+
 ESOKIT_FUNCTION CCode c_code(const RecordedDesign& design) {
-  if (!design.options.settings_in_struct) return c_texts(design, "");
-  RecordedDesign rest = design;
-  for (double& number : rest.numbers) number = 0;
-  for (auto& row : rest.gap_gains) std::fill(row.begin(), row.end(), 0.0);
-  if (rest.recovers) {  // what is due, and from which gap on, are settings, too
-    std::fill(rest.recovery.begin(), rest.recovery.end(), std::uint16_t{0});
-    rest.max_gap = 0;
-  }
-  rest.samples.clear();
-  rest.options.comment = {};
-  rest.options.settings_name = {};
-  const CCode same = c_texts(rest, "");
-  std::uint32_t mark = 2166136261u;  // FNV-1a
-  for (const char c : same.header + same.source) {
-    mark = (mark ^ static_cast<unsigned char>(c)) * 16777619u;
-  }
-  return c_texts(design, std::to_string(mark) + "u");
+  const std::string hash = design_hash(design);
+  if (!design.options.settings_in_struct) return c_texts(design, "", hash);
+  return c_texts(design, std::to_string(hash_of_texts(without_settings(design))) + "u", hash);
 }
 
 }  // namespace esokit::detail

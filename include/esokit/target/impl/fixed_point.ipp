@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <esokit/core/expected.hpp>
 #include <esokit/target/c_code.hpp>
+#include <esokit/target/design_text.hpp>
 #include <esokit/target/fixed_design.hpp>
 #include <esokit/target/fixed_point.hpp>
 #include <esokit/target/runtime_text.hpp>
@@ -75,20 +76,18 @@ class FixedText {
     set_rest();
     set_estimates();
     set_tables();
-    set_about("");
+    set_about("", "");
     std::string set;
     if (opens_) {
       // What is the same for all settings has a mark: all but what comes now.
-      mark = 2166136261u;  // FNV-1a
-      for (const char c : text_.header(runtime::fixed_header) + text_.source({runtime::fixed})) {
-        mark = (mark ^ static_cast<unsigned char>(c)) * 16777619u;
-      }
+      mark = hash_of(text_.header(runtime::fixed_header) + text_.source({runtime::fixed}));
       text_.constant("DESIGN_MARK", std::to_string(mark) + "u");
       text_.replace("esokit_DESIGN_SET", name() + "_" + design_.options.settings_name);
       set = settings();
       text_.lines("DESIGN_SET_OF_SETTINGS", set);
     }
-    set_about(design_.options.comment);
+    set_about(design_.options.comment,
+              structure_text(design_) + ", design " + design_hash(design_));
     set_bounds();
     set_samples();
     return {text_.header(runtime::fixed_header), text_.source({runtime::fixed}),
@@ -443,12 +442,14 @@ class FixedText {
     if (d_.rate > 0) set += "  " + rate() + ",\n";
     return set + "  {\n" + correct_m_ + "  },\n  {\n" + correct_p_ + "  }\n};\n\n";
   }
-  void set_about(const std::string& comment) {
+  void set_about(const std::string& comment, const std::string& identity) {
     const FixedPointOptions& options = d_.options();
     text_.lines("DESIGN_ABOUT", (comment.empty() ? "" : " * " + comment + "\n") +
                                     " * T = " + text_of(design_.sample_time) +
                                     " s; fixed point: a count of y is " + text_of(options.y.unit) +
-                                    ", a count of u " + text_of(options.u.unit) + ".\n");
+                                    ", a count of u " + text_of(options.u.unit) + ".\n * " +
+                                    identity + ".\n");
+    text_.replace("DESIGN_TEXT", "\"" + identity + "\"");
   }
   void set_bounds() {
     const auto of = [](const FixedBound& bound, const char* unit) {
@@ -505,8 +506,10 @@ class FixedText {
 
 ESOKIT_FUNCTION Expected<FixedCode, Error<double>> fixed_code(const RecordedDesign& recorded,
                                                               const FixedPointOptions& options) {
-  if (recorded.options.moving_reference) {
-    return Error<double>{"moving_reference", 1, "is not written in fixed point"};
+  for (const auto& [field, is_set] :
+       {std::pair{"moving_reference", recorded.options.moving_reference},
+        std::pair{"saves_state", recorded.options.saves_state}}) {
+    if (is_set) return Error<double>{field, 1, "is not written in fixed point"};
   }
   const bool given = options.settings_for != nullptr;
   FixedDesign design(recorded, options, given ? &options.settings_for->layout : nullptr);

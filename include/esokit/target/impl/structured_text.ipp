@@ -2,6 +2,7 @@
 
 #include <esokit/core/expected.hpp>
 #include <esokit/target/c_code.hpp>
+#include <esokit/target/design_text.hpp>
 #include <esokit/target/list_writer.hpp>
 #include <esokit/target/recorded_design.hpp>
 #include <esokit/target/st_translator.hpp>
@@ -15,6 +16,7 @@ namespace detail {
 // The block itself: what a PLC calls, around the functions that are translated.
 inline constexpr const char* st_head = R"((* Written by esokit from a finished design; do not edit.
 $COMMENT   FUNCTION_BLOCK $name is at the end: call it once in each T = $TIME s; b0 = $GAIN.
+   $DESIGN.
 
    status, the sum of: 1 y was NaN, infinite or too large, 2 u was too large, 4 the next good y
    restarts, 8 samples were missing before this one, 16 restarted because too many were missing,
@@ -228,6 +230,7 @@ ESOKIT_FUNCTION StructuredText structured_text(const RecordedDesign& design) {
        {"$OF_R", controls || design.predictive
                      ? ",\n   256 r was NaN, infinite or too large: u is as it was"
                      : ""},
+       {"$DESIGN", structure_text(design) + ", design " + design_hash(design)},
        {"$TIME", number(design.sample_time)},
        {"$GAIN", number(design.input_gain)}}));
   if (design.options.settings_in_struct) {

@@ -446,6 +446,71 @@ real esokit_estimate(const esokit_state *o, unsigned row)
   return estimate_at(o, row);
 }
 
+#if ESOKIT_SAVED
+/* ---- A state that is kept over a restart. */
+
+static uint32_t crc_of(const esokit_state *o)
+{
+  const uint8_t *const bytes = (const uint8_t *)o;
+  uint32_t crc = 0xffffffffu;
+  uint32_t i;
+  for (i = 0u; i < (uint32_t)sizeof *o; ++i) {
+    unsigned bit;
+    crc = crc ^ bytes[i];
+    for (bit = 0u; bit < 8u; ++bit) {
+      crc = (crc >> 1) ^ (((crc & 1u) != 0u) ? 0xedb88320u : 0u);
+    }
+  }
+  return ~crc;
+}
+
+void esokit_save(const esokit_state *o, esokit_saved *to)
+{
+  to->design = DESIGN_NUMBER;
+  to->size = (uint32_t)sizeof to->state;
+  to->state = *o;
+  to->crc = crc_of(&to->state); /* with what lies between its members */
+}
+
+/* Nothing of a sample is known but u. */
+static void pass_sample(esokit_state *o, real u)
+{
+#if ESOKIT_CONTROLLER
+  skip_sample(o, u);
+#else
+  (void)observe_predict(o, u);
+#endif
+}
+
+bool esokit_load(esokit_state *o, const esokit_saved *from, uint32_t samples, real u)
+{
+  const uint32_t count = (samples < UINT16_MAX) ? samples : UINT16_MAX; /* no more are counted */
+  uint32_t i;
+#if ESOKIT_SETTINGS
+  const esokit_settings *const settings = o->settings;
+#endif
+  if ((from->design != DESIGN_NUMBER) || (from->size != (uint32_t)sizeof from->state)) {
+    return false;
+  }
+  if ((from->crc != crc_of(&from->state)) || !is_finite(u)) {
+    return false;
+  }
+  *o = from->state;
+#if ESOKIT_SETTINGS
+  o->settings = settings; /* they may lie elsewhere by now, or be others */
+  recover_anew(o);
+#endif
+  for (i = 0u; i < count; ++i) {
+    pass_sample(o, u);
+  }
+#if ESOKIT_CONTROLLER
+  take_command(o, u);
+  o->elsewhere = 1u;
+#endif
+  return true;
+}
+
+#endif
 #ifdef ESOKIT_SELF_TEST
 int esokit_self_test(real tolerance)
 {

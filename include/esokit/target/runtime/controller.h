@@ -8,7 +8,7 @@ DESIGN_ABOUT
  *
  * Compile with -std=c99 or -ffp-contract=off: then it equals the C++ DESIGN_EXACTLY. */
 
-#if ESOKIT_SETTINGS || ESOKIT_GUARDED
+#if ESOKIT_SETTINGS || ESOKIT_GUARDED || ESOKIT_SAVED
 #include <stdbool.h>
 #endif
 #include <stdint.h>
@@ -18,6 +18,8 @@ extern "C" {
 #endif
 
 #define ESOKIT_SAMPLE_TIME SAMPLE_TIME /* s */
+/* The design as a string, for a log or an image: it takes no memory unless it is used. */
+#define ESOKIT_DESIGN DESIGN_TEXT
 
 /* Flags of `status`; 0: all is well. */
 #define ESOKIT_MEASUREMENT_REJECTED 1u /* y was NaN, infinite or too large */
@@ -253,6 +255,22 @@ bool esokit_set_input_gain(esokit_state *o, real b);
 /* Other settings, of a design with the same sample time, b0 and structure, from now on; estimates
  * and output are kept. False, and nothing changes, if they are of another text. */
 bool esokit_adopt(esokit_state *o, const esokit_settings *settings);
+
+#endif
+#if ESOKIT_SAVED
+/* A state to be kept over a restart, where its bytes stay as they are. */
+typedef struct {
+  uint32_t design; /* that of ESOKIT_DESIGN */
+  uint32_t size;
+  uint32_t crc; /* CRC-32 of the state */
+  esokit_state state;
+} esokit_saved;
+
+void esokit_save(const esokit_state *o, esokit_saved *to);
+/* Goes on in a saved state, after init: `samples` of them are missing between the saved one and the
+ * next, which are bridged or not as any gap; in these u acted, and it still does (0 for an actuator
+ * that was off). It takes a prediction for each, at most 65535. False, and nothing changes, for a state of another design or with a wrong bit. */
+bool esokit_load(esokit_state *o, const esokit_saved *from, uint32_t samples, real u);
 
 #endif
 #ifdef ESOKIT_SELF_TEST

@@ -17,6 +17,9 @@ DESIGN_BOUNDS
 extern "C" {
 #endif
 
+/* The design as a string, for a log or an image: it takes no memory unless it is used. */
+#define ESOKIT_DESIGN DESIGN_TEXT
+
 /* Flags of `status`; 0: all is well. */
 #define ESOKIT_MEASUREMENT_REJECTED 1u /* y was outside its range: no measurement */
 #define ESOKIT_INPUT_REJECTED 2u /* u was outside its range: the end of the range was used */
