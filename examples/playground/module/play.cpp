@@ -707,7 +707,7 @@ Outcome within_reason(const Settings& s) {
   if (!(s[samples] >= 100.0 && s[samples] <= 20000.0 && s[samples] == std::floor(s[samples])))
     return Error<double>{"samples", s[samples], "must be a whole number, 100 .. 20000"};
   if (maps(s) && s[rate] > 0.0)
-    return Error<double>{"rate", s[rate], "is played without a curve that is known only: must be",
+    return Error<double>{"rate", s[rate], "is simulated without a known curve only: must be",
                          -1,     0.0,     true};
   if (!(s[dead_time] <= 900.0 * s[sample_time]))
     return Error<double>{"dead_time", s[dead_time], "must not be above 900 sample times"};
