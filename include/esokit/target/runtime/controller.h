@@ -268,8 +268,9 @@ typedef struct {
 
 void esokit_save(const esokit_state *o, esokit_saved *to);
 /* Goes on in a saved state, after init: `samples` of them are missing between the saved one and the
- * next, which are bridged or not as any gap; in these u acted, and it still does (0 for an actuator
- * that was off). It takes a prediction for each, at most 65535. False, and nothing changes, for a state of another design or with a wrong bit. */
+ * next, which are bridged or not as any gap. In these u acted, and it still does (0 for an actuator
+ * that was off). It takes a prediction for each, at most 65535. False, and nothing changes, for a
+ * state of another design or with a wrong bit. */
 bool esokit_load(esokit_state *o, const esokit_saved *from, uint32_t samples, real u);
 
 #endif
