@@ -362,7 +362,8 @@ class LogFile {
                          "it has a zero byte: it is no text, or UTF-16 without its mark; save it "
                          "as UTF-8");
         }
-        if (line.find_first_not_of(" \t,;|") == std::string::npos) continue;
+        tidy(line);
+        if (line.find_first_not_of(" \t,;|[]") == std::string::npos) continue;
         const auto after = after_comment_mark(line);
         head = {after ? line.substr(*after) : line, lines.number(), after.has_value(),
                 lines.whole()};
@@ -530,9 +531,8 @@ class LogFile {
       const auto first = static_cast<unsigned char>(begin < end ? line[begin] : ' ');
       if (!(first > 127 || std::isalpha(first) != 0 || first == '_')) continue;
       if (all.empty() && begin > 0) {
-        const std::string_view before = trimmed(line.substr(0, begin));
-        const std::string_view word = before.substr(0, before.find_first_of(ends));
-        if (!word.empty() && is_number(word, ' ')) all.push_back({{}, word, false});
+        if (const auto stamp = stamp_before(line.substr(0, begin)); !stamp.empty())
+          all.push_back({{}, stamp, false});
       }
       std::size_t value = i + 1;
       while (value < line.size() &&
@@ -542,10 +542,41 @@ class LogFile {
       while (from < line.size() &&
              (ends.find(line[from]) == std::string_view::npos || in_number(from)))
         ++from;
-      all.push_back({line.substr(begin, end - begin), line.substr(value, from - value),
-                     line[i] == '=' || value > i + 1});
+      // What is before another label is the name of a part of the program: "motor: u=0.5".
+      const std::string_view text = line.substr(value, from - value);
+      if (!text.empty() && std::isalpha(static_cast<unsigned char>(text[0])) != 0 &&
+          text.find_first_of(":=") != std::string_view::npos) {
+        from = value;
+        continue;
+      }
+      all.push_back(
+          {line.substr(begin, end - begin), text, line[i] == '=' || value > i + 1 || end < i});
       i = from > i ? from - 1 : i;
     }
+  }
+
+  /// The stamp or number of a line before its labels: "12.5 u=1", "[12.5] u=1", "I (1234) motor:
+  /// u=1", "2024-03-01 12:00:00,010 INFO u=1".
+  static std::string_view stamp_before(std::string_view before) {
+    const auto first = before.find_first_not_of(" \t,;|{}[]()\"'");
+    if (first == std::string_view::npos) return {};
+    const auto word_from = [&](std::size_t from) {
+      return before.substr(from, before.find_first_of(" \t;|{}[]()\"'", from) - from);
+    };
+    std::string_view word = word_from(first);
+    if (const auto second = before.find_first_not_of(' ', first + word.size());
+        second != std::string_view::npos) {
+      const auto both = before.substr(first, second - first + word_from(second).size());
+      if (parse_stamp(both)) return both;
+    }
+    while (word.ends_with(',')) word.remove_suffix(1);
+    if (is_number(word)) return word;
+    const auto open = before.find_first_of("([", first);
+    if (open == std::string_view::npos || before[open - 1] != ' ') return {};
+    const auto inside = before.find_first_not_of(' ', open + 1);
+    if (inside == std::string_view::npos) return {};
+    word = word_from(inside);
+    return !word.empty() && is_number(word) ? word : std::string_view{};
   }
 
   /// Lines of labels with blanks or equals signs, of which at least two have numbers.
@@ -565,7 +596,7 @@ class LogFile {
         if (at == names.size())
           names.emplace_back(one.label), seen.push_back(0), numbers.push_back(0);
         ++seen[at];
-        numbers[at] += is_value(one.value, ' ') ? 1U : 0U;
+        numbers[at] += is_value(one.value) ? 1U : 0U;
         apart += one.apart ? 1U : 0U;
       }
     }
@@ -616,7 +647,7 @@ class LogFile {
       for (std::size_t c = 0; c < fields.size(); ++c) {
         if (fields[c].empty()) continue;
         ++filled[c];
-        if (is_value(fields[c], separator)) ++numbers[c];
+        if (is_value(fields[c])) ++numbers[c];
       }
     }
     Shape shape;
@@ -663,8 +694,8 @@ class LogFile {
     for (std::size_t c = 0; c < std::min(fields.size(), shape.number.size()); ++c) {
       if (!shape.number[c] || fields[c].empty()) continue;
       ++filled;
-      if (is_number(fields[c], separator_) || !unit_behind(fields[c]).empty()) ++are;
-      if (is_value(fields[c], separator_)) ++values;
+      if (is_number(fields[c]) || !unit_behind(fields[c]).empty()) ++are;
+      if (is_value(fields[c])) ++values;
     }
     // A name may be "on", too.
     return are == 0 ? Numbers::none : values < filled ? Numbers::some : Numbers::all;
@@ -672,7 +703,7 @@ class LogFile {
 
   [[noreturn]] void refuse_row(std::size_t line, const Shape& shape, const Fields& fields) const {
     for (std::size_t c = 0; c < std::min(fields.size(), shape.number.size()); ++c) {
-      if (shape.number[c] && !fields[c].empty() && !is_value(fields[c], separator_)) {
+      if (shape.number[c] && !fields[c].empty() && !is_value(fields[c])) {
         throw LogError(at(line) + "'" + std::string(fields[c]) + "' in column " +
                        std::to_string(c + 1) + " is not a number");
       }
@@ -684,7 +715,7 @@ class LogFile {
   /// More numbers than names: the names are shifted, or the comma is a decimal one.
   void check_count(std::size_t line, const Fields& fields) const {
     for (std::size_t i = count_; i < fields.size(); ++i) {
-      if (fields[i].empty() || !is_number(fields[i], separator_)) continue;
+      if (fields[i].empty() || !is_number(fields[i])) continue;
       throw LogError(
           at(line) + "it has " + std::to_string(fields.size()) + " fields, but " +
           (headers_.empty() ? "the lines before have " + std::to_string(count_)
@@ -692,6 +723,22 @@ class LogFile {
                                   std::to_string(count_) + " names") +
           (separator_ == ',' ? "; with decimal commas the separator must be another one" : ""));
     }
+  }
+
+  /// Minus signs and blanks of typesetters, and what stands around the objects of a JSON array.
+  static void tidy(std::string& line) {
+    if (line.find_first_of("\xE2\xC2") != std::string::npos) {
+      for (const auto& [other, plain] : {std::pair<std::string_view, char>{"\xE2\x88\x92", '-'},
+                                         {"\xE2\x80\xAF", ' '},
+                                         {"\xC2\xA0", ' '}}) {
+        for (auto at = line.find(other); at != std::string::npos; at = line.find(other, at))
+          line.replace(at, other.size(), 1, plain);
+      }
+    }
+    const auto first = line.find_first_not_of(" \t[,");
+    const auto last = line.find_last_not_of(" \t],");
+    if (first != std::string::npos && line[first] == '{' && line[last] == '}')
+      line = line.substr(first, last - first + 1);
   }
 
   /// Where the text of a comment starts.
@@ -756,7 +803,7 @@ class LogFile {
 
   /// A number, or NaN for an empty field and the usual words for one that is missing.
   template <class Number = double>
-  [[nodiscard]] static std::optional<Number> parse(std::string_view text, char separator) {
+  [[nodiscard]] static std::optional<Number> parse(std::string_view text) {
     constexpr Number nan = std::numeric_limits<Number>::quiet_NaN();
     if (text.empty()) return nan;
     if (text.front() > '9' || text.front() == '#' || text.front() == '-') {
@@ -767,7 +814,7 @@ class LogFile {
     }
     if (text.front() == '+') text.remove_prefix(1);
     std::array<char, 64> point{};
-    const auto comma = separator != ',' ? text.find(',') : std::string_view::npos;
+    const auto comma = text.find(',');
     const auto exponent = text.find_first_of("dD");  // of Fortran: 1.5D-03
     if ((comma != std::string_view::npos || exponent != std::string_view::npos) &&
         text.size() < point.size()) {
@@ -794,7 +841,7 @@ class LogFile {
 
   /// Words that stand for a number: 1, 0, or NaN where a sensor failed.
   [[nodiscard]] static std::optional<double> word_value(std::string_view field) {
-    if (field.empty() || field.size() > 8) return std::nullopt;
+    if (field.empty() || field.size() > 12) return std::nullopt;
     std::string text(field);
     for (char& c : text) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c;
     for (const std::string_view one : {"on", "true", "ein", "yes"}) {
@@ -804,8 +851,10 @@ class LogFile {
       if (text == zero) return 0.0;
     }
     for (const std::string_view lost :
-         {"err", "error", "fail", "failed", "fault", "bad", "invalid", "ovf", "ol", "-", "--",
-          "---", "?", "#value!", "#ref!", "#div/0!", "#num!", "missing"}) {
+         {"err",   "error",       "fail",    "failed",  "fault",       "bad", "invalid",
+          "ovf",   "ol",          "-",       "--",      "---",         "?",   "#value!",
+          "#ref!", "#div/0!",     "#num!",   "missing", "n/a",         "na",  "nil",
+          "none",  "unavailable", "unknown", "timeout", "disconnected"}) {
       if (text == lost) return std::numeric_limits<double>::quiet_NaN();
     }
     return std::nullopt;
@@ -844,17 +893,16 @@ class LogFile {
   }
 
   /// Whether a field of a column of numbers may say so.
-  static bool is_value(std::string_view field, char separator) {
-    return is_number(field, separator) || word_value(field).has_value() ||
-           !unit_behind(field).empty();
+  static bool is_value(std::string_view field) {
+    return is_number(field) || word_value(field).has_value() || !unit_behind(field).empty();
   }
-  static bool is_number(std::string_view field, char separator) {
+  static bool is_number(std::string_view field) {
     if (const auto label = label_of(field); !label.empty()) field.remove_prefix(label.size() + 1);
-    return parse(field, separator).has_value() || parse_stamp(field).has_value();
+    return parse(field).has_value() || parse_stamp(field).has_value();
   }
   [[nodiscard]] bool all_numbers(const Fields& fields) const {
     return std::all_of(fields.begin(), fields.end(),
-                       [&](std::string_view field) { return is_number(field, separator_); });
+                       [](std::string_view field) { return is_number(field); });
   }
 
   /// The column of which alone `fits` is true of a name, in the first line of names that has one.
@@ -950,9 +998,9 @@ class LogFile {
     }
     double found = 0;
     if (stamps_ == wanted) {
-      std::optional<long double> number = parse(field, separator_);
+      std::optional<long double> number = parse(field);
       // More digits than a double has are those of nanoseconds since 1970.
-      if (number && field.size() > 15) number = parse<long double>(field, separator_);
+      if (number && field.size() > 15) number = parse<long double>(field);
       if (number) {
         ++cells.numbers;
         found =
@@ -962,7 +1010,7 @@ class LogFile {
       } else {
         wrong = "is neither a number nor a time like 2024-03-01T12:00:00.01 or 12:00:00.01";
       }
-    } else if (const auto number = parse(field, separator_)) {
+    } else if (const auto number = parse(field)) {
       found = *number;
       if (!field.empty()) ++cells.numbers;
     } else if (const auto stands_for = word_value(field)) {
@@ -1001,6 +1049,13 @@ class LogFile {
     const bool comma = field.find(',') != std::string_view::npos;
     if (!comma && (field.find('.') == std::string_view::npos)) return;
     if (field.find(':') != std::string_view::npos) return;
+    // Between commas it was in quotation marks: after "0,25" all are decimal ones.
+    if (comma && separator_ == ',' && comma_line_ == 0 && field.size() == field.find(',') + 4 &&
+        field.find_first_of("123456789") < field.find(',')) {
+      throw LogError(at(line) + "'" + std::string(field) +
+                     "' has a decimal comma or one of thousands: write it without separators of "
+                     "thousands, or with a point");
+    }
     (comma ? comma_line_ : point_line_) = line;
     if (comma_line_ == 0 || point_line_ == 0) return;
     throw LogError(at(line) + "'" + std::string(field) + "' has a decimal " +

@@ -668,6 +668,28 @@ iconv -f LATIN1 -t UTF-16BE german.csv | { printf '\xfe\xff'; cat; } | tr '\n' '
 reads big.csv
 table , | awk -F, '{ print "ms:" 1000 * $1 " u:" $3 " y:" $2 }' >labels.txt
 reads labels.txt --time ms
+# A stamp before the labels, and the names of parts of a program.
+table , | awk -F, '{ printf "[%10.6f] u=%s y=%s\n", 12 + $1, $3, $2 }' >kernel.txt
+reads kernel.txt --time-unit s
+table , | awk -F, '{ printf "I (%d) motor: u=%s y=%s\n", 1234 + 1000 * $1, $3, $2 }' >esp.txt
+reads esp.txt --time-unit ms
+stamped 'sprintf("2024-02-%d %s", 28 + d, clock())' 'stamp " INFO [main] u=" $3 " y=" $2' | sed 's/\(:[0-9][0-9]\)[.]/\1,/' >logger.txt
+reads logger.txt
+{ echo '['; table , | awk -F, '{ printf "{\"t\":%s,\"y\":%s,\"u\":%s},\n", $1, $2, $3 }' | sed '$ s/,$//'; echo ']'; } >array.json
+reads array.json
+{ echo t,y,u; table , | sed 's/-/\xe2\x88\x92/g'; } >typeset_minus.csv
+reads typeset_minus.csv
+{ echo '"t","y","u"'; table ';' | sed 's/[.]/,/g; s/;/","/g; s/.*/"&"/'; } >quoted_commas.csv
+reads quoted_commas.csv
+{ echo t,y,u; echo '1,"1,234",5'; echo '2,"2,345",6'; } >quoted_thousands.csv
+refuses 'write it without separators of thousands' quoted_thousands.csv "${settings[@]}"
+{ echo header.stamp.sec,header.stamp.nanosec,position,effort
+  table , | awk -F, '{ printf "%d,%d,%s,%s\n", 1700000000 + int($1 + 1e-9), (100 * $1) % 100 * 1e7, $2, $3 }'; } >ros2.csv
+reads ros2.csv
+{ echo t,y,u; table , | awk -F, -v OFS=, 'NR % 90 == 7 { $2 = NR % 4 ? "n/a" : "unavailable" } 1'; } >missing_words.csv
+reads missing_words.csv
+{ echo t,setpoint,feedback,output; table , | awk -F, '{ print $1 ",0," $2 "," $3 }'; } >feedback.csv
+reads feedback.csv
 { printf 'Trace;PLC_1;Motor\nTime;MAIN.Angle;MAIN.Torque\nms;rad;Nm\n'
   table ';' | awk -F';' -v OFS=';' '{ $1 *= 1000 } 1'; } >plc.csv
 reads plc.csv

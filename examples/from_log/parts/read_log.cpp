@@ -101,7 +101,7 @@ constexpr Usual usual_names[] = {
      "e chauffage voltaje tensi\xc3\xb3n corriente par entrada tensione corrente coppia ",
      'u'},
     {" y position pos angle theta measurement meas measured height phi distance odometer pv "
-     "process actual ",
+     "process actual feedback encoder response ",
      'y'},
     {" winkel lage weg ausgang messwert istwert sortie posicion posici\xc3\xb3n \xc3\xa1ngulo "
      "angulo salida posizione angolo uscita ",
@@ -583,6 +583,29 @@ void hold_changes(const Settings& settings, Input& input) {
   input.line = std::move(lines);
 }
 
+/// The column with what a clock has beyond whole seconds, and how much one is: nanosec beside sec.
+std::optional<std::pair<std::string, double>> fraction_of(const LogFile& file,
+                                                          const std::string& time) {
+  const auto place = [](const std::string& name) { return name.find_last_of("./_ ") + 1; };
+  constexpr std::string_view whole = " sec secs seconds s ";
+  const std::string lowered = lower(time);
+  if (lowered.empty() || whole.find(" " + lowered.substr(place(lowered)) + " ") == whole.npos)
+    return std::nullopt;
+  for (const auto& names : file.headers()) {
+    for (const std::string& name : names) {
+      const std::string other = lower(name), last = other.substr(place(other));
+      if (other.substr(0, place(other)) != lowered.substr(0, place(lowered))) continue;
+      for (const auto& [words, unit] :
+           {std::pair{" nanosec nanosecs nanoseconds nsec nsecs ns ", 1e-9},
+            std::pair{" usec usecs microsec microseconds us ", 1e-6}}) {
+        if (std::string_view(words).find(" " + last + " ") != std::string_view::npos)
+          return std::pair{name, unit};
+      }
+    }
+  }
+  return std::nullopt;
+}
+
 /// The same column twice is no log.
 void refuse_same(const Settings& settings, const LogFile& file,
                  const std::vector<std::string>& wanted, bool timed) {
@@ -632,6 +655,8 @@ Input read_log(const Settings& settings) {
                                      guess(header, "y", settings.y, taken, input.notes)};
   if (timed) wanted.push_back(guess(header, "time", settings.time, taken, input.notes));
   wanted.insert(wanted.end(), settings.measured.begin(), settings.measured.end());
+  const auto fraction = timed ? fraction_of(header, wanted[2]) : std::nullopt;
+  if (fraction) wanted.push_back(fraction->first);
   const LogFile file(source, wanted, settings.separator,
                      timed ? std::optional<std::size_t>(2) : std::nullopt);
   refuse_same(settings, file, wanted, timed);
@@ -643,7 +668,8 @@ Input read_log(const Settings& settings) {
   input.cut = file.cut();
   input.log.u = file.column(0);
   input.log.y = file.column(1);
-  for (std::size_t c = timed ? 3 : 2; c < wanted.size(); ++c) {
+  const std::size_t measured = wanted.size() - (fraction ? 1 : 0);
+  for (std::size_t c = timed ? 3 : 2; c < measured; ++c) {
     input.measured.push_back(file.name(c));
     input.log.columns.push_back(file.column(c));
     if (share_missing(input.log.columns.back()) > 0.999)
@@ -660,6 +686,11 @@ Input read_log(const Settings& settings) {
   }
   input.time = file.name(2);
   std::vector<double> stamps = file.column(2);
+  if (fraction) {
+    const std::vector<double>& parts = file.column(measured);
+    for (std::size_t k = 0; k < stamps.size(); ++k) stamps[k] += fraction->second * parts[k];
+    input.notes.push_back("Time is " + input.time + " and " + fraction->first + " together.");
+  }
   const auto topics = [&] {
     return share_missing(input.log.u) > 0.2 || share_missing(input.log.y) > 0.2;
   };
