@@ -99,6 +99,26 @@ std::string against_pid(const std::vector<esokit::TunedPid>& baselines,
          ", tuned for the same under the same rules, is within 1 %. Its code is below." + lost;
 }
 
+/// Of a machine of order 1 whose limits are not symmetric: where it worked in the log, and what u
+/// has left there. Else empty.
+std::string what_is_left(const esokit::TuneModel& model, const esokit::FitData& rows) {
+  const double range = model.u_max - model.u_min;
+  if (model.order != 1 || std::abs(model.u_min + model.u_max) < 0.1 * range || rows.u.empty())
+    return "";
+  double u = 0.0, y = 0.0;
+  for (std::size_t k = 0; k < rows.u.size(); ++k) {
+    u += rows.u[k] / static_cast<double>(rows.u.size());
+    y += rows.y[k] / static_cast<double>(rows.u.size());
+  }
+  const double up = model.u_max - u, down = u - model.u_min;
+  const double slope = std::abs(model.input_gain.value);
+  const auto text = [](double x) { return number_text(x, 3); };
+  return "In the log u was " + text(u) + " on average and y " + text(y) + ". There u has " +
+         text(up) + " left upwards, which move y by at most " + text(slope * up) +
+         " a second, and " + text(down) + " downwards, " + text(slope * down) + " a second." +
+         (model.u_min >= 0.0 ? " No u pulls: y falls no faster than it does by itself." : "");
+}
+
 /// What the measured disturbances take of u in the log, what is left of d without them, and how far
 /// they would move y under the code, with and without measuring.
 std::string what_measuring_saves(const esokit::Tuning& tuning, const esokit::TunedDesign& taken,
@@ -318,6 +338,8 @@ Design Design::make(const Settings& settings, const Input& input, const Findings
         " are those that the log shows, " + number_text(limits.first, 4) + " to " +
         number_text(limits.second, 4) + "; set others with --limits.");
   }
+  if (const auto left = what_is_left(tuning->model, findings.rows); !left.empty())
+    design.summary_.push_back(left);
   const esokit::FitData machine = simulated(found, rows);
   const Replay expected = through(form, found.input_gain.value, found.order, machine);
   const auto settling = std::min<std::size_t>(
