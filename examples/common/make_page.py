@@ -254,7 +254,7 @@ def figure(out, example, item):
 
 def shown_table(out, example, item):
     """A comparison's verdicts become marks behind our numbers; one that is too wide for a window is
-    split between metrics."""
+    split between metrics, and each part says which it has."""
     rows = read_csv(out / example.folder / item.name)
     compared = item.kind == "comparison"
     marks = {"ok": ' <span class="pass" title="met">✓</span>',
@@ -263,7 +263,7 @@ def shown_table(out, example, item):
     count = len(rows[0])
     verdicts = [compared and heading.endswith(", result") for heading in rows[0]] + [False]
     ends = [c + 1 for c in range(1, count) if not compared or verdicts[c]]
-    text, start = "", 1
+    parts, start = [], 1
     while start < count:
         ahead = [end for end in ends if end > start]
         stop = max([end for end in ahead if end - start <= WIDEST] or ahead[:1])
@@ -278,10 +278,15 @@ def shown_table(out, example, item):
                 [cell(plain(row[c]), words[c]) if c in words else
                  f"<td>{esc(plain(row[c]))}{marks.get(row[c + 1], '') if verdicts[c + 1] else ''}</td>"
                  for c in shown_columns] for row in rows_here]
-        text += table(item.text + (" (continued)" if text else ""),
-                      [rows[0][0]] + [rows[0][c] for c in shown_columns], body,
-                      [c in words for c in [0, *shown_columns]])
+        parts += [(shown_columns, words, body)] if shown_columns else []
         start = stop
+    text = ""
+    for columns, words, body in parts:
+        headings = [rows[0][c] for c in columns]
+        outer = [one.rsplit(", ", 1)[0] if compared else one for one in (headings[0], headings[-1])]
+        part = f" ({' to '.join(dict.fromkeys(outer))})" if len(parts) > 1 else ""
+        text += table(item.text + part, [rows[0][0]] + headings, body,
+                      [c in words for c in [0, *columns]])
     return text
 
 
