@@ -139,7 +139,7 @@ int main(int argc, char** argv) {
   report.expect("window 60 s, loop 1 s", "error over that of a loop of 60 s",
                 rms(bad) / rms(long_one), rms(bad) > 1.5 * rms(long_one), "above 1.5");
 
-  Figure figure("relay", {.rows = 2, .columns = 1, .panel_height = 190});
+  Figure figure("heater_relay", {.rows = 2, .columns = 1, .panel_height = 190});
   figure.caption(
       "A heater on a relay that is to be at 55 °C: a loop as slow as its window of 10 s, and one "
       "of 1 s in a window of 60 s.");

@@ -27,8 +27,8 @@ enum class CurveKind {
 /// The b0 beside it is that of u as it was logged: `identify(curve.acted(log))` gives that of the
 /// effect, for an observer in MappedInput.
 struct SeenCurve {
-  CurveKind kind = CurveKind::straight;
-  Estimate size{};    ///< unit of u; of a square without an interval
+  CurveKind kind = CurveKind::straight;  ///< straight: none was seen
+  Estimate size{};                       ///< unit of u; of a square without an interval
   double left = 1.0;  ///< mean square of the innovations with it, over that without
 
   /// Whether there is one.
