@@ -223,9 +223,9 @@ design=
 healthy plain.csv
 [[ $(grep -c '<h2>Paste this' "$page") == 1 ]]
 verdict $? "plain.csv: no controller on $page"
-first=$page
+first=$(realpath "$page")
 (
-  mkdir -p pasted && cp play.cpp pasted && cd pasted && compiles "../$first"
+  mkdir -p pasted && cp play.cpp pasted && cd pasted && compiles "$first"
 ) &
 pasted=$!
 before=$(cksum <"$first")
@@ -509,9 +509,9 @@ for log in servo_relay_pid/{relay,pid_sine}.csv dfki_simple_pendulum/{ddp,direct
   dfki_pendulum_mass_change/energy_shaping{,_1kg}.csv; do
   run "$data/$log" --no-design
   status=$?
-  # The servo's drive does saturate.
+  # The servo's drive does saturate: 57 deg/s at full drive are known, and 0.857 * 67.7 = 58.
   if [[ $log == */pid_sine.csv ]]; then
-    [[ $status == 4 && $alarms == "large-u " ]]
+    [[ $status == 0 && -z $alarms && $said == 'The actuator saturates: u (u_pct) beyond ± 67.7 '* ]]
   else
     [[ ($status == 3 || $status == 0) && -z $alarms ]]
   fi
