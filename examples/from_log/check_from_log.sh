@@ -690,6 +690,8 @@ reads ros2.csv
 reads missing_words.csv
 { echo t,setpoint,feedback,output; table , | awk -F, '{ print $1 ",0," $2 "," $3 }'; } >feedback.csv
 reads feedback.csv
+{ echo t,u,position,encoder; table , | awk -F, '{ print $1 "," $3 "," $2 "," int(100 * $2) }'; } >counts_beside.csv
+reads counts_beside.csv
 { printf 'Trace;PLC_1;Motor\nTime;MAIN.Angle;MAIN.Torque\nms;rad;Nm\n'
   table ';' | awk -F';' -v OFS=';' '{ $1 *= 1000 } 1'; } >plc.csv
 reads plc.csv

@@ -101,7 +101,7 @@ constexpr Usual usual_names[] = {
      "e chauffage voltaje tensi\xc3\xb3n corriente par entrada tensione corrente coppia ",
      'u'},
     {" y position pos angle theta measurement meas measured height phi distance odometer pv "
-     "process actual feedback encoder response ",
+     "process actual feedback ",
      'y'},
     {" winkel lage weg ausgang messwert istwert sortie posicion posici\xc3\xb3n \xc3\xa1ngulo "
      "angulo salida posizione angolo uscita ",
