@@ -40,7 +40,7 @@
 #include <string>
 #include <vector>
 
-#include <esokit/tune/controller.hpp>
+#include <esokit/tune/tuned_controller.hpp>
 
 #include "choosing/overload.hpp"
 #include "common/compiled/tune.hpp"

@@ -16,7 +16,7 @@
 #include <utility>
 #include <vector>
 
-#include <esokit/tune/controller.hpp>
+#include <esokit/tune/tuned_controller.hpp>
 
 #include "common/compiled/tune.hpp"
 #include "common/figure.hpp"

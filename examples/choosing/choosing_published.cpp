@@ -22,7 +22,7 @@
 #include <utility>
 #include <vector>
 
-#include <esokit/analysis/controllers.hpp>
+#include <esokit/analysis/library_systems.hpp>
 #include <esokit/observer/linear_eso.hpp>
 
 #include "common/compiled/tune.hpp"

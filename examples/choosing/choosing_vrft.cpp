@@ -26,9 +26,9 @@
 #include <vector>
 
 #include <Eigen/Dense>
-#include <esokit/analysis/controllers.hpp>
+#include <esokit/analysis/library_systems.hpp>
 #include <esokit/analysis/margins.hpp>
-#include <esokit/tune/controller.hpp>
+#include <esokit/tune/tuned_controller.hpp>
 
 #include "common/compiled/study.hpp"
 #include "common/compiled/tune.hpp"

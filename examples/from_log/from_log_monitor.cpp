@@ -21,8 +21,8 @@
 #include <vector>
 
 #include <esokit/control/health.hpp>
-#include <esokit/tune/controller.hpp>
 #include <esokit/tune/tune.hpp>
+#include <esokit/tune/tuned_controller.hpp>
 
 #include "common/parallel.hpp"
 #include "common/report.hpp"

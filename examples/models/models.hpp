@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include <esokit/analysis/controllers.hpp>
 #include <esokit/analysis/delay_margin.hpp>
+#include <esokit/analysis/library_systems.hpp>
 #include <esokit/analysis/loop_noise.hpp>
 #include <esokit/analysis/margins.hpp>
 #include <esokit/control/adrc.hpp>

@@ -13,7 +13,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <esokit/analysis/controllers.hpp>
+#include <esokit/analysis/library_systems.hpp>
 #include <esokit/analysis/loop_noise.hpp>
 #include <esokit/analysis/margins.hpp>
 #include <functional>

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <esokit/analysis/eigenvalues.hpp>
+#include <esokit/analysis/detail/eigenvalues.hpp>
 #include <esokit/analysis/linear_system.hpp>
 #include <esokit/analysis/lyapunov.hpp>
 #include <esokit/analysis/lyapunov_matrix.hpp>

@@ -13,7 +13,7 @@
 #include <esokit/control/gain_probe.hpp>
 #include <esokit/control/health.hpp>
 #include <esokit/control/predictive_adrc.hpp>
-#include <esokit/model/parts_shape.hpp>
+#include <esokit/model/detail/parts_layout.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <support/numbers.hpp>
 #include <support/refusal.hpp>

@@ -10,7 +10,7 @@
 #include <esokit/adapter/guarded.hpp>
 #include <esokit/adapter/mapped_input.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
-#include <esokit/analysis/controllers.hpp>
+#include <esokit/analysis/library_systems.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/control/health.hpp>

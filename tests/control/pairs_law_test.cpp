@@ -13,7 +13,7 @@
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
-#include <esokit/analysis/controllers.hpp>
+#include <esokit/analysis/library_systems.hpp>
 #include <esokit/analysis/loop.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/disturbance_compensator.hpp>

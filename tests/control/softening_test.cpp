@@ -7,7 +7,7 @@
 #include <deque>
 #include <esokit/adapter/guarded.hpp>
 #include <esokit/adapter/variable_time.hpp>
-#include <esokit/analysis/controllers.hpp>
+#include <esokit/analysis/library_systems.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/core/snapshot.hpp>
 #include <esokit/eigen.hpp>

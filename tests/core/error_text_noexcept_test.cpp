@@ -6,7 +6,7 @@
 #include <esokit/control/control_loop.hpp>
 #include <esokit/core/error_text.hpp>
 #include <esokit/core/expected.hpp>
-#include <esokit/gain/step_status.hpp>
+#include <esokit/core/step_status.hpp>
 #include <string>
 
 namespace {

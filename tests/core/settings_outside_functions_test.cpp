@@ -5,8 +5,8 @@
 #include <esokit/identify/identified.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
+#include <esokit/target/detail/recorded_numbers.hpp>
 #include <esokit/target/fixed_options.hpp>
-#include <esokit/target/recorded_numbers.hpp>
 
 #include <gtest/gtest.h>
 

@@ -6,9 +6,9 @@
 #include <esokit/adapter/guarded.hpp>
 #include <esokit/control/control_loop.hpp>
 #include <esokit/control/experiment.hpp>
+#include <esokit/core/detail/unroll.hpp>
 #include <esokit/core/snapshot.hpp>
-#include <esokit/core/unroll.hpp>
-#include <esokit/gain/step_status.hpp>
+#include <esokit/core/step_status.hpp>
 #include <type_traits>
 
 #include "fuzz/game.hpp"

@@ -3,7 +3,7 @@
 /// said of a failure. Compiled once; driver.hpp has what depends on the type.
 #pragma once
 
-#include <esokit/gain/step_status.hpp>
+#include <esokit/core/step_status.hpp>
 #include <vector>
 
 #include "fuzz/config.hpp"

@@ -6,8 +6,8 @@
 #include <complex>
 #include <cstddef>
 #include <cstdint>
+#include <esokit/core/detail/unroll.hpp>
 #include <esokit/core/matrix.hpp>
-#include <esokit/core/unroll.hpp>
 #include <limits>
 #include <string>
 #include <support/numbers.hpp>

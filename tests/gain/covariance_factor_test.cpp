@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <esokit/eigen.hpp>
-#include <esokit/gain/covariance_factor.hpp>
+#include <esokit/gain/detail/covariance_factor.hpp>
 #include <limits>
 #include <support/numbers.hpp>
 

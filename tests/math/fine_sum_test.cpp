@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <esokit/math/fine_sum.hpp>
+#include <esokit/math/detail/fine_sum.hpp>
 #include <esokit/sim/trapezoid.hpp>
 #include <limits>
 #include <support/numbers.hpp>

@@ -3,7 +3,7 @@
 #pragma once
 
 #include <cstddef>
-#include <esokit/gain/step_status.hpp>
+#include <esokit/core/step_status.hpp>
 #include <memory>
 #include <optional>
 #include <string>

@@ -3,9 +3,9 @@
 #pragma once
 
 #include <esokit/adapter/known_model.hpp>
+#include <esokit/core/detail/type_tag.hpp>
 #include <esokit/core/lanes.hpp>
 #include <esokit/core/scalar.hpp>
-#include <esokit/core/type_tag.hpp>
 
 namespace esokit_test {
 

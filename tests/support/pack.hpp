@@ -6,8 +6,8 @@
 #include <Eigen/Core>
 #include <cmath>
 #include <cstddef>
+#include <esokit/core/detail/unroll.hpp>
 #include <esokit/core/scalar.hpp>
-#include <esokit/core/unroll.hpp>
 
 namespace esokit_test {
 

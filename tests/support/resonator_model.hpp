@@ -5,8 +5,8 @@
 
 #include <cmath>
 #include <esokit/core/check.hpp>
+#include <esokit/core/detail/kernels.hpp>
 #include <esokit/core/expected.hpp>
-#include <esokit/core/kernels.hpp>
 #include <esokit/model/sampled_model.hpp>
 #include <esokit/model/scaled_chain.hpp>
 

@@ -11,7 +11,7 @@
 #include <cmath>
 #include <cstdint>
 #include <esokit/adapter/guarded.hpp>
-#include <esokit/core/unroll.hpp>
+#include <esokit/core/detail/unroll.hpp>
 #include <functional>
 #include <limits>
 #include <optional>

@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <esokit/analysis/eigenvalues.hpp>
+#include <esokit/analysis/detail/eigenvalues.hpp>
 #include <stdexcept>
 
 namespace esokit_test {

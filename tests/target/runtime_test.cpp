@@ -2,8 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
-#include <esokit/target/c_design.hpp>
-#include <esokit/target/runtime_text.hpp>
+#include <esokit/target/detail/c_design.hpp>
+#include <esokit/target/detail/runtime_text.hpp>
 #include <esokit/target/structured_text.hpp>
 #include <set>
 #include <sstream>

@@ -16,9 +16,9 @@
 #include <esokit/model/linear_plant.hpp>
 #include <esokit/sim/gaussian.hpp>
 #include <esokit/sim/run.hpp>
-#include <esokit/tune/controller.hpp>
 #include <esokit/tune/pid_baselines.hpp>
 #include <esokit/tune/tune.hpp>
+#include <esokit/tune/tuned_controller.hpp>
 #include <limits>
 #include <random>
 #include <string>

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <complex>
 #include <cstdio>
-#include <esokit/identify/gain_evidence.hpp>
+#include <esokit/identify/detail/b0_evidence.hpp>
 #include <esokit/identify/input_checks.hpp>
 #include <esokit/identify/spectrum.hpp>
 #include <numbers>

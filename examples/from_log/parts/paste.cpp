@@ -13,7 +13,7 @@
 #include <esokit/gain/gating_certificate.hpp>
 #include <esokit/sim/gaussian.hpp>
 #include <esokit/sim/run.hpp>
-#include <esokit/tune/controller.hpp>
+#include <esokit/tune/tuned_controller.hpp>
 
 namespace from_log {
 namespace {

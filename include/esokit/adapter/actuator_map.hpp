@@ -4,7 +4,7 @@
 #pragma once
 
 #include <esokit/core/check.hpp>
-#include <esokit/core/kernels.hpp>
+#include <esokit/core/detail/kernels.hpp>
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/scalar.hpp>
 #include <limits>

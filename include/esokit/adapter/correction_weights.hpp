@@ -3,9 +3,9 @@
 #pragma once
 
 #include <cstdint>
+#include <esokit/core/detail/unroll.hpp>
 #include <esokit/core/scalar.hpp>
-#include <esokit/core/unroll.hpp>
-#include <esokit/gain/step_status.hpp>
+#include <esokit/core/step_status.hpp>
 
 namespace esokit {
 

@@ -5,10 +5,10 @@
 #include <cstdint>
 #include <esokit/adapter/adapter.hpp>
 #include <esokit/core/check.hpp>
-#include <esokit/core/kernels.hpp>
+#include <esokit/core/detail/kernels.hpp>
+#include <esokit/core/detail/type_tag.hpp>
+#include <esokit/core/detail/unroll.hpp>
 #include <esokit/core/lanes.hpp>
-#include <esokit/core/type_tag.hpp>
-#include <esokit/core/unroll.hpp>
 
 namespace esokit {
 

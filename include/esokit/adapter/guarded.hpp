@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <esokit/adapter/adapter.hpp>
 #include <esokit/adapter/correction_weights.hpp>
-#include <esokit/adapter/guarded_states.hpp>
+#include <esokit/adapter/detail/guarded_states.hpp>
 #include <esokit/core/check.hpp>
-#include <esokit/core/type_tag.hpp>
+#include <esokit/core/detail/type_tag.hpp>
 #include <limits>
 
 namespace esokit {

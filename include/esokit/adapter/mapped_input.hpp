@@ -4,8 +4,8 @@
 
 #include <esokit/adapter/actuator_map.hpp>
 #include <esokit/adapter/adapter.hpp>
+#include <esokit/core/detail/type_tag.hpp>
 #include <esokit/core/lanes.hpp>
-#include <esokit/core/type_tag.hpp>
 #include <utility>
 
 namespace esokit {

@@ -4,7 +4,7 @@
 
 #include <esokit/adapter/adapter.hpp>
 #include <esokit/core/check.hpp>
-#include <esokit/core/type_tag.hpp>
+#include <esokit/core/detail/type_tag.hpp>
 #include <esokit/model/measured_input.hpp>
 #include <esokit/model/sampled_model.hpp>
 #include <limits>

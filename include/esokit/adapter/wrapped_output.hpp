@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <esokit/adapter/adapter.hpp>
 #include <esokit/core/check.hpp>
-#include <esokit/core/type_tag.hpp>
+#include <esokit/core/detail/type_tag.hpp>
 #include <limits>
 #include <type_traits>
 

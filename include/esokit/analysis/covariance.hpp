@@ -4,7 +4,7 @@
 
 #include <esokit/analysis/lyapunov.hpp>
 #include <esokit/analysis/observer_system.hpp>
-#include <esokit/core/compiled.hpp>
+#include <esokit/core/detail/compiled.hpp>
 
 namespace esokit {
 

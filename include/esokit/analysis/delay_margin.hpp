@@ -3,7 +3,7 @@
 #pragma once
 
 #include <esokit/analysis/margins.hpp>
-#include <esokit/core/compiled.hpp>
+#include <esokit/core/detail/compiled.hpp>
 
 namespace esokit {
 

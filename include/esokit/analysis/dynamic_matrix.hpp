@@ -5,7 +5,7 @@
 
 #include <cassert>
 #include <cstddef>
-#include <esokit/math/dense.hpp>
+#include <esokit/math/detail/dense.hpp>
 #include <vector>
 
 namespace esokit {

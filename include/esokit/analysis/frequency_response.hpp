@@ -5,8 +5,8 @@
 #include <cmath>
 #include <complex>
 #include <esokit/analysis/linear_system.hpp>
-#include <esokit/core/compiled.hpp>
-#include <esokit/math/dense.hpp>
+#include <esokit/core/detail/compiled.hpp>
+#include <esokit/math/detail/dense.hpp>
 #include <numbers>
 
 namespace esokit {

@@ -5,7 +5,7 @@
 #include <concepts>
 #include <esokit/control/health.hpp>
 #include <esokit/control/telemetry.hpp>
-#include <esokit/core/text.hpp>
+#include <esokit/core/detail/text.hpp>
 
 namespace esokit {
 

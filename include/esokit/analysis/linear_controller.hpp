@@ -5,7 +5,7 @@
 #include <concepts>
 #include <esokit/analysis/dynamic_matrix.hpp>
 #include <esokit/core/check.hpp>
-#include <esokit/core/compiled.hpp>
+#include <esokit/core/detail/compiled.hpp>
 #include <esokit/core/expected.hpp>
 #include <vector>
 

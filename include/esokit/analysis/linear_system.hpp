@@ -4,12 +4,12 @@
 
 #include <esokit/analysis/dynamic_matrix.hpp>
 #include <esokit/core/check.hpp>
-#include <esokit/core/compiled.hpp>
+#include <esokit/core/detail/compiled.hpp>
+#include <esokit/core/detail/unroll.hpp>
 #include <esokit/core/error.hpp>
 #include <esokit/core/expected.hpp>
-#include <esokit/core/unroll.hpp>
 #include <esokit/eigen.hpp>
-#include <esokit/math/dense.hpp>
+#include <esokit/math/detail/dense.hpp>
 
 namespace esokit {
 

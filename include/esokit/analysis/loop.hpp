@@ -3,12 +3,12 @@
 #pragma once
 
 #include <complex>
-#include <esokit/analysis/controllers.hpp>
 #include <esokit/analysis/dynamic_matrix.hpp>
 #include <esokit/analysis/frequency_response.hpp>
+#include <esokit/analysis/library_systems.hpp>
 #include <esokit/analysis/linear_controller.hpp>
 #include <esokit/analysis/poles.hpp>
-#include <esokit/core/compiled.hpp>
+#include <esokit/core/detail/compiled.hpp>
 #include <esokit/model/linear_plant.hpp>
 #include <vector>
 

@@ -4,7 +4,7 @@
 
 #include <esokit/analysis/covariance.hpp>
 #include <esokit/analysis/loop.hpp>
-#include <esokit/core/compiled.hpp>
+#include <esokit/core/detail/compiled.hpp>
 #include <vector>
 
 namespace esokit {

@@ -3,8 +3,8 @@
 #pragma once
 
 #include <esokit/analysis/linear_system.hpp>
-#include <esokit/core/compiled.hpp>
-#include <esokit/math/dense.hpp>
+#include <esokit/core/detail/compiled.hpp>
+#include <esokit/math/detail/dense.hpp>
 
 namespace esokit {
 

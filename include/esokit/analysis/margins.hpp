@@ -3,8 +3,8 @@
 /// b.
 #pragma once
 
-#include <esokit/analysis/loop_scan.hpp>
-#include <esokit/core/compiled.hpp>
+#include <esokit/analysis/detail/loop_scan.hpp>
+#include <esokit/core/detail/compiled.hpp>
 #include <esokit/core/interval.hpp>
 #include <limits>
 #include <optional>

@@ -4,7 +4,7 @@
 
 #include <complex>
 #include <esokit/adapter/measured.hpp>
-#include <esokit/analysis/controllers.hpp>
+#include <esokit/analysis/library_systems.hpp>
 #include <esokit/analysis/loop.hpp>
 #include <type_traits>
 

@@ -10,7 +10,7 @@
 #include <cstddef>
 #include <esokit/analysis/integrator_chain.hpp>
 #include <esokit/analysis/linear_system.hpp>
-#include <esokit/core/compiled.hpp>
+#include <esokit/core/detail/compiled.hpp>
 #include <esokit/gain/sampled_gain.hpp>
 #include <esokit/model/chain_model.hpp>
 #include <esokit/model/sampled_model.hpp>

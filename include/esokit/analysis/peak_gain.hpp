@@ -5,8 +5,8 @@
 
 #include <cmath>
 #include <esokit/analysis/poles.hpp>
-#include <esokit/core/compiled.hpp>
-#include <esokit/math/dense.hpp>
+#include <esokit/core/detail/compiled.hpp>
+#include <esokit/math/detail/dense.hpp>
 
 namespace esokit {
 

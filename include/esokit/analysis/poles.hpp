@@ -3,9 +3,9 @@
 #pragma once
 
 #include <complex>
-#include <esokit/analysis/eigenvalues.hpp>
+#include <esokit/analysis/detail/eigenvalues.hpp>
 #include <esokit/analysis/linear_system.hpp>
-#include <esokit/core/compiled.hpp>
+#include <esokit/core/detail/compiled.hpp>
 #include <limits>
 #include <vector>
 

@@ -4,7 +4,7 @@
 
 #include <cstddef>
 #include <esokit/analysis/delay_margin.hpp>
-#include <esokit/core/compiled.hpp>
+#include <esokit/core/detail/compiled.hpp>
 #include <utility>
 #include <vector>
 

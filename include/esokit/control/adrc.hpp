@@ -6,10 +6,10 @@
 #include <esokit/control/adrc_law.hpp>
 #include <esokit/control/control_loop.hpp>
 #include <esokit/control/controller.hpp>
-#include <esokit/control/softening.hpp>
+#include <esokit/control/detail/softening.hpp>
 #include <esokit/core/check.hpp>
-#include <esokit/core/kernels.hpp>
-#include <esokit/core/type_tag.hpp>
+#include <esokit/core/detail/kernels.hpp>
+#include <esokit/core/detail/type_tag.hpp>
 #include <esokit/gain/feedback_gain.hpp>
 #include <type_traits>
 

@@ -5,10 +5,10 @@
 
 #include <esokit/control/reference.hpp>
 #include <esokit/core/check.hpp>
+#include <esokit/core/detail/type_tag.hpp>
+#include <esokit/core/detail/unroll.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/matrix.hpp>
-#include <esokit/core/type_tag.hpp>
-#include <esokit/core/unroll.hpp>
 #include <esokit/math/combinatorics.hpp>
 #include <optional>
 #include <type_traits>

@@ -7,11 +7,11 @@
 #include <cstdint>
 #include <esokit/control/limiter.hpp>
 #include <esokit/core/check.hpp>
+#include <esokit/core/detail/type_tag.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/snapshot.hpp>
-#include <esokit/core/type_tag.hpp>
-#include <esokit/math/fine_sum.hpp>
+#include <esokit/math/detail/fine_sum.hpp>
 
 namespace esokit {
 

@@ -7,9 +7,9 @@
 #include <concepts>
 #include <cstdint>
 #include <esokit/control/limiter.hpp>
-#include <esokit/core/unroll.hpp>
+#include <esokit/core/detail/unroll.hpp>
 #include <esokit/observer/concepts.hpp>
-#include <esokit/observer/steady_state.hpp>
+#include <esokit/observer/detail/steady_state.hpp>
 #include <optional>
 
 namespace esokit {

@@ -4,7 +4,7 @@
 
 #include <concepts>
 #include <esokit/core/check.hpp>
-#include <esokit/core/declared.hpp>
+#include <esokit/core/detail/declared_traits.hpp>
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/scalar.hpp>
 #include <type_traits>

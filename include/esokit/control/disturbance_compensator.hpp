@@ -5,7 +5,7 @@
 #include <esokit/control/control_loop.hpp>
 #include <esokit/control/controller.hpp>
 #include <esokit/core/check.hpp>
-#include <esokit/core/type_tag.hpp>
+#include <esokit/core/detail/type_tag.hpp>
 #include <limits>
 
 namespace esokit {

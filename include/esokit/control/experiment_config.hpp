@@ -6,8 +6,8 @@
 #include <concepts>
 #include <esokit/control/limiter.hpp>
 #include <esokit/core/check.hpp>
+#include <esokit/core/detail/text.hpp>
 #include <esokit/core/expected.hpp>
-#include <esokit/core/text.hpp>
 #include <optional>
 
 namespace esokit {

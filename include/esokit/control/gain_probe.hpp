@@ -8,8 +8,8 @@
 #include <esokit/control/control_loop.hpp>
 #include <esokit/control/limiter.hpp>
 #include <esokit/core/check.hpp>
+#include <esokit/core/detail/type_tag.hpp>
 #include <esokit/core/expected.hpp>
-#include <esokit/core/type_tag.hpp>
 #include <type_traits>
 
 namespace esokit {

@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <esokit/control/control_loop.hpp>
 #include <esokit/core/check.hpp>
+#include <esokit/core/detail/type_tag.hpp>
 #include <esokit/core/expected.hpp>
-#include <esokit/core/type_tag.hpp>
 #include <esokit/model/sampled_model.hpp>
 #include <limits>
 #include <type_traits>

@@ -7,11 +7,11 @@
 #include <esokit/control/controller.hpp>
 #include <esokit/control/limiter.hpp>
 #include <esokit/core/check.hpp>
-#include <esokit/core/unroll.hpp>
+#include <esokit/core/detail/unroll.hpp>
 #include <esokit/gain/feedback_gain.hpp>
-#include <esokit/math/dense.hpp>
+#include <esokit/math/detail/dense.hpp>
 #include <esokit/observer/concepts.hpp>
-#include <esokit/observer/steady_state.hpp>
+#include <esokit/observer/detail/steady_state.hpp>
 #include <limits>
 #include <string_view>
 #include <tuple>

@@ -3,9 +3,9 @@
 #pragma once
 
 #include <esokit/core/check.hpp>
+#include <esokit/core/detail/unroll.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/matrix.hpp>
-#include <esokit/core/unroll.hpp>
 #include <esokit/math/fal.hpp>
 #include <utility>
 

@@ -11,12 +11,12 @@
 #include <esokit/control/controller.hpp>
 #include <esokit/control/limiter.hpp>
 #include <esokit/core/check.hpp>
-#include <esokit/core/kernels.hpp>
-#include <esokit/core/type_tag.hpp>
+#include <esokit/core/detail/kernels.hpp>
+#include <esokit/core/detail/type_tag.hpp>
+#include <esokit/core/step_status.hpp>
 #include <esokit/gain/gain_law.hpp>
-#include <esokit/gain/step_status.hpp>
 #include <esokit/observer/concepts.hpp>
-#include <esokit/observer/steady_state.hpp>
+#include <esokit/observer/detail/steady_state.hpp>
 #include <optional>
 
 namespace esokit {

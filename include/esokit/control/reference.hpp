@@ -4,9 +4,9 @@
 
 #include <concepts>
 #include <cstddef>
+#include <esokit/core/detail/unroll.hpp>
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/scalar.hpp>
-#include <esokit/core/unroll.hpp>
 
 namespace esokit {
 

@@ -7,10 +7,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <esokit/core/check.hpp>
+#include <esokit/core/detail/type_tag.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/lanes.hpp>
 #include <esokit/core/matrix.hpp>
-#include <esokit/core/type_tag.hpp>
 #include <esokit/math/combinatorics.hpp>
 #include <limits>
 

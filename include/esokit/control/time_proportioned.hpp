@@ -5,9 +5,9 @@
 #include <cmath>
 #include <cstdint>
 #include <esokit/core/check.hpp>
+#include <esokit/core/detail/type_tag.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/snapshot.hpp>
-#include <esokit/core/type_tag.hpp>
 
 namespace esokit {
 

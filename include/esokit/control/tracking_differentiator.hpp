@@ -6,7 +6,7 @@
 #include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/matrix.hpp>
-#include <esokit/math/fine_sum.hpp>
+#include <esokit/math/detail/fine_sum.hpp>
 
 namespace esokit {
 

@@ -4,11 +4,11 @@
 
 #include <concepts>
 #include <cstdlib>
+#include <esokit/core/detail/unroll.hpp>
 #include <esokit/core/error.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/scalar.hpp>
-#include <esokit/core/unroll.hpp>
 #include <limits>
 
 namespace esokit {

@@ -2,8 +2,8 @@
 /// The error of a refused configuration: which field, which value, which rule.
 #pragma once
 
+#include <esokit/core/detail/text.hpp>
 #include <esokit/core/lanes.hpp>
-#include <esokit/core/text.hpp>
 
 #if defined(__linux__) || defined(_WIN32) || defined(__APPLE__)
 #include <cstdio>

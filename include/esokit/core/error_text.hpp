@@ -4,7 +4,7 @@
 /// tested.
 #pragma once
 
-#include <esokit/core/text.hpp>
+#include <esokit/core/detail/text.hpp>
 #include <sstream>
 #include <string>
 #include <version>

@@ -3,7 +3,7 @@
 #pragma once
 
 #include <cstdlib>
-#include <esokit/core/text.hpp>
+#include <esokit/core/detail/text.hpp>
 #include <type_traits>
 #include <utility>
 #include <variant>

@@ -11,9 +11,9 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
-#include <esokit/core/declared.hpp>
+#include <esokit/core/detail/declared_traits.hpp>
+#include <esokit/core/detail/unroll.hpp>
 #include <esokit/core/scalar.hpp>
-#include <esokit/core/unroll.hpp>
 #include <optional>
 #include <tuple>
 #include <type_traits>
@@ -227,7 +227,7 @@ struct LaneAccess {
 #undef ESOKIT_FOR_PACKS
 };
 
-struct RecordAccess;  // target/record_access.hpp
+struct RecordAccess;  // target/detail/record_access.hpp
 
 /// A std::array or a Matrix.
 template <class T>

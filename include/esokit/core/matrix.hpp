@@ -11,8 +11,8 @@
 #include <cassert>
 #include <concepts>
 #include <cstddef>
+#include <esokit/core/detail/text.hpp>
 #include <esokit/core/language.hpp>
-#include <esokit/core/text.hpp>
 #include <type_traits>
 #include <utility>
 

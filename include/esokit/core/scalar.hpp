@@ -140,8 +140,8 @@ constexpr bool all(bool condition) noexcept { return condition; }
 template <class T>
 inline constexpr int lane_count = 1;
 
-/// Whether a scalar records its operations, see target/recording.hpp. A step leaves out no part of
-/// its work for such a scalar, whatever the numbers are: else the list would lack it.
+/// Whether a scalar records its operations, see target/recording_scalar.hpp. A step leaves out no
+/// part of its work for such a scalar, whatever the numbers are: else the list would lack it.
 template <class T>
 inline constexpr bool records = false;
 

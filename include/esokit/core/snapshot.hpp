@@ -8,9 +8,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <esokit/core/detail/type_tag.hpp>
 #include <esokit/core/error.hpp>
 #include <esokit/core/expected.hpp>
-#include <esokit/core/type_tag.hpp>
 #include <esokit/core/version.hpp>
 #include <type_traits>
 

@@ -2,8 +2,8 @@
 /// The constant gain law of the linear observers, sampled and continuous.
 #pragma once
 
+#include <esokit/core/detail/type_tag.hpp>
 #include <esokit/core/lanes.hpp>
-#include <esokit/core/type_tag.hpp>
 #include <esokit/gain/gain_law.hpp>
 #include <esokit/gain/placement.hpp>
 #include <esokit/model/chain_model.hpp>

@@ -2,9 +2,9 @@
 /// Gains of the continuous observer with all poles of its estimation error at one place.
 #pragma once
 
+#include <esokit/core/detail/unroll.hpp>
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/scalar.hpp>
-#include <esokit/core/unroll.hpp>
 #include <esokit/math/combinatorics.hpp>
 
 namespace esokit {

@@ -5,7 +5,7 @@
 
 #include <cmath>
 #include <esokit/core/check.hpp>
-#include <esokit/core/unroll.hpp>
+#include <esokit/core/detail/unroll.hpp>
 #include <esokit/gain/continuous_gain.hpp>
 #include <esokit/gain/half_gain.hpp>
 #include <esokit/gain/sampled_gain.hpp>

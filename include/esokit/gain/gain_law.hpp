@@ -4,9 +4,9 @@
 
 #include <concepts>
 #include <esokit/core/check.hpp>
-#include <esokit/core/declared.hpp>
+#include <esokit/core/detail/declared_traits.hpp>
 #include <esokit/core/scalar.hpp>
-#include <esokit/gain/bridged_steps.hpp>
+#include <esokit/gain/detail/bridged_steps.hpp>
 #include <esokit/gain/sampled_gain.hpp>
 #include <utility>
 

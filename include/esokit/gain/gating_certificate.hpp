@@ -21,11 +21,11 @@
 #pragma once
 
 #include <cmath>
-#include <esokit/gain/model_placement.hpp>
+#include <esokit/gain/detail/model_placement.hpp>
 #include <esokit/gain/switching_certificate.hpp>
-#include <esokit/math/dense.hpp>
+#include <esokit/math/detail/dense.hpp>
 #include <esokit/model/chain_model.hpp>
-#include <esokit/model/corrected_part.hpp>
+#include <esokit/model/detail/observable_part.hpp>
 
 namespace esokit {
 

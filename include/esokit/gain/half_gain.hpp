@@ -13,8 +13,8 @@
 #pragma once
 
 #include <cmath>
-#include <esokit/core/type_tag.hpp>
-#include <esokit/core/unroll.hpp>
+#include <esokit/core/detail/type_tag.hpp>
+#include <esokit/core/detail/unroll.hpp>
 #include <esokit/gain/placement.hpp>
 #include <numbers>
 

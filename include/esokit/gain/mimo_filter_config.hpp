@@ -3,8 +3,8 @@
 #pragma once
 
 #include <esokit/core/check.hpp>
+#include <esokit/gain/detail/noise_settings.hpp>
 #include <esokit/gain/mimo_riccati.hpp>
-#include <esokit/gain/noise_settings.hpp>
 #include <esokit/gain/riccati_settings.hpp>
 #include <optional>
 

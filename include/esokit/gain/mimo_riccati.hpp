@@ -3,7 +3,7 @@
 #pragma once
 
 #include <cmath>
-#include <esokit/gain/covariance_factor.hpp>
+#include <esokit/gain/detail/covariance_factor.hpp>
 #include <esokit/gain/riccati.hpp>
 #include <esokit/gain/sampled_gain.hpp>
 

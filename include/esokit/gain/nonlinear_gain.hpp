@@ -3,7 +3,7 @@
 /// two limits; and the functions k of the literature.
 #pragma once
 
-#include <esokit/core/type_tag.hpp>
+#include <esokit/core/detail/type_tag.hpp>
 #include <esokit/gain/constant_gain.hpp>
 #include <esokit/math/fal.hpp>
 #include <esokit/math/power.hpp>

@@ -5,7 +5,7 @@
 /// the measurement, which leaves an observer of order N - 1 for the other states.
 #pragma once
 
-#include <esokit/core/type_tag.hpp>
+#include <esokit/core/detail/type_tag.hpp>
 #include <esokit/gain/placement.hpp>
 
 namespace esokit {

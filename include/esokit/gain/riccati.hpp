@@ -15,10 +15,10 @@
 #include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/matrix.hpp>
-#include <esokit/gain/covariance_factor.hpp>
-#include <esokit/gain/model_placement.hpp>
+#include <esokit/gain/detail/covariance_factor.hpp>
+#include <esokit/gain/detail/model_placement.hpp>
 #include <esokit/gain/sampled_gain.hpp>
-#include <esokit/math/dense.hpp>
+#include <esokit/math/detail/dense.hpp>
 #include <limits>
 #include <optional>
 

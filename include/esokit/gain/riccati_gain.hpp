@@ -18,8 +18,8 @@
 
 #include <cmath>
 #include <cstdint>
-#include <esokit/core/type_tag.hpp>
-#include <esokit/gain/covariance_factor.hpp>
+#include <esokit/core/detail/type_tag.hpp>
+#include <esokit/gain/detail/covariance_factor.hpp>
 #include <esokit/gain/gain_law.hpp>
 #include <esokit/gain/riccati_settings.hpp>
 #include <esokit/model/sampled_model.hpp>

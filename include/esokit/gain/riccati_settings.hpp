@@ -2,7 +2,7 @@
 /// Settings of RiccatiGain.
 #pragma once
 
-#include <esokit/gain/covariance_factor.hpp>
+#include <esokit/gain/detail/covariance_factor.hpp>
 
 namespace esokit {
 

@@ -4,7 +4,7 @@
 #pragma once
 
 #include <cmath>
-#include <esokit/core/type_tag.hpp>
+#include <esokit/core/detail/type_tag.hpp>
 #include <esokit/gain/constant_gain.hpp>
 #include <limits>
 

@@ -13,12 +13,12 @@
 
 #include <array>
 #include <cstddef>
-#include <esokit/core/compiled.hpp>
+#include <esokit/core/detail/compiled.hpp>
 #include <esokit/core/scalar.hpp>
+#include <esokit/identify/detail/timed_column.hpp>
 #include <esokit/identify/innovations_filter.hpp>
 #include <esokit/identify/spectrum.hpp>
-#include <esokit/identify/timed_column.hpp>
-#include <esokit/math/dense.hpp>
+#include <esokit/math/detail/dense.hpp>
 #include <limits>
 #include <span>
 #include <vector>

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <esokit/core/check.hpp>
-#include <esokit/core/compiled.hpp>
+#include <esokit/core/detail/compiled.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/identify/fit.hpp>
 #include <esokit/identify/input_checks.hpp>

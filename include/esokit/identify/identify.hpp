@@ -3,17 +3,17 @@
 #pragma once
 
 #include <esokit/core/check.hpp>
-#include <esokit/core/compiled.hpp>
+#include <esokit/core/detail/compiled.hpp>
 #include <esokit/core/error.hpp>
 #include <esokit/core/expected.hpp>
+#include <esokit/identify/detail/b0_evidence.hpp>
+#include <esokit/identify/detail/intervals.hpp>
+#include <esokit/identify/detail/order_selection.hpp>
 #include <esokit/identify/fit.hpp>
-#include <esokit/identify/gain_evidence.hpp>
 #include <esokit/identify/identified.hpp>
 #include <esokit/identify/input_checks.hpp>
-#include <esokit/identify/intervals.hpp>
 #include <esokit/identify/log.hpp>
 #include <esokit/identify/measured_columns.hpp>
-#include <esokit/identify/order_fits.hpp>
 #include <esokit/identify/plateau.hpp>
 #include <esokit/identify/second_opinion.hpp>
 #include <esokit/identify/seen_curve.hpp>

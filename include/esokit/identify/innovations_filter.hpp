@@ -6,11 +6,11 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <esokit/core/compiled.hpp>
+#include <esokit/core/detail/compiled.hpp>
 #include <esokit/core/scalar.hpp>
+#include <esokit/identify/detail/timed_column.hpp>
 #include <esokit/identify/spectrum.hpp>
-#include <esokit/identify/timed_column.hpp>
-#include <esokit/math/dense.hpp>
+#include <esokit/math/detail/dense.hpp>
 #include <memory>
 #include <vector>
 

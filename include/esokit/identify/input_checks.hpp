@@ -4,9 +4,9 @@
 #pragma once
 
 #include <cstddef>
-#include <esokit/core/compiled.hpp>
+#include <esokit/core/detail/compiled.hpp>
+#include <esokit/identify/detail/intervals.hpp>
 #include <esokit/identify/fit.hpp>
-#include <esokit/identify/intervals.hpp>
 #include <utility>
 #include <vector>
 

@@ -4,7 +4,7 @@
 
 #include <cstddef>
 #include <esokit/core/check.hpp>
-#include <esokit/core/compiled.hpp>
+#include <esokit/core/detail/compiled.hpp>
 #include <esokit/core/error.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/identify/fit.hpp>

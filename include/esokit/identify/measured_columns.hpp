@@ -5,10 +5,10 @@
 #include <cmath>
 #include <cstddef>
 #include <esokit/core/check.hpp>
-#include <esokit/core/compiled.hpp>
+#include <esokit/core/detail/compiled.hpp>
 #include <esokit/core/error.hpp>
+#include <esokit/identify/detail/timed_column.hpp>
 #include <esokit/identify/fit.hpp>
-#include <esokit/identify/timed_column.hpp>
 #include <esokit/model/measured_input.hpp>
 #include <utility>
 #include <vector>

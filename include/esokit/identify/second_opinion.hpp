@@ -7,9 +7,9 @@
 /// b0, it can be trusted.
 #pragma once
 
-#include <esokit/core/compiled.hpp>
+#include <esokit/core/detail/compiled.hpp>
+#include <esokit/identify/detail/intervals.hpp>
 #include <esokit/identify/fit.hpp>
-#include <esokit/identify/intervals.hpp>
 
 namespace esokit {
 

@@ -3,7 +3,7 @@
 #pragma once
 
 #include <esokit/adapter/actuator_map.hpp>
-#include <esokit/core/compiled.hpp>
+#include <esokit/core/detail/compiled.hpp>
 #include <esokit/identify/fit.hpp>
 #include <esokit/identify/input_checks.hpp>
 #include <esokit/identify/log.hpp>

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <complex>
 #include <cstddef>
-#include <esokit/core/compiled.hpp>
+#include <esokit/core/detail/compiled.hpp>
 #include <esokit/core/language.hpp>
 #include <numbers>
 #include <utility>

@@ -2,8 +2,8 @@
 /// Whether a polynomial is positive on the whole half line.
 #pragma once
 
+#include <esokit/core/detail/unroll.hpp>
 #include <esokit/core/scalar.hpp>
-#include <esokit/core/unroll.hpp>
 #include <esokit/math/combinatorics.hpp>
 #include <type_traits>
 

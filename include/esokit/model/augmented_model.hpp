@@ -5,14 +5,14 @@
 
 #include <cmath>
 #include <esokit/core/check.hpp>
+#include <esokit/core/detail/type_tag.hpp>
+#include <esokit/core/detail/unroll.hpp>
 #include <esokit/core/expected.hpp>
-#include <esokit/core/type_tag.hpp>
-#include <esokit/core/unroll.hpp>
-#include <esokit/math/dense.hpp>
-#include <esokit/model/corrected_part.hpp>
+#include <esokit/math/detail/dense.hpp>
+#include <esokit/model/detail/observable_part.hpp>
+#include <esokit/model/detail/parts_layout.hpp>
 #include <esokit/model/matrix_model.hpp>
 #include <esokit/model/model_parts.hpp>
-#include <esokit/model/parts_shape.hpp>
 #include <esokit/model/sampled_model.hpp>
 #include <limits>
 

@@ -2,7 +2,7 @@
 /// ChainModel: the chain of integrators as the model of an observer, used if nothing else is known.
 #pragma once
 
-#include <esokit/core/kernels.hpp>
+#include <esokit/core/detail/kernels.hpp>
 #include <esokit/core/lanes.hpp>
 #include <esokit/model/sampled_model.hpp>
 #include <esokit/model/scaled_chain.hpp>

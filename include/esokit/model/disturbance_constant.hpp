@@ -2,10 +2,10 @@
 /// The constant of the disturbance among the states of a model, as guards of it see it.
 #pragma once
 
-#include <esokit/core/kernels.hpp>
+#include <esokit/core/detail/kernels.hpp>
+#include <esokit/core/detail/unroll.hpp>
 #include <esokit/core/scalar.hpp>
-#include <esokit/core/unroll.hpp>
-#include <esokit/math/dense.hpp>
+#include <esokit/math/detail/dense.hpp>
 #include <esokit/model/sampled_model.hpp>
 #include <limits>
 #include <utility>

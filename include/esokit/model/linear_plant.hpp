@@ -3,11 +3,11 @@
 #pragma once
 
 #include <esokit/core/check.hpp>
+#include <esokit/core/detail/unroll.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/lanes.hpp>
 #include <esokit/core/matrix.hpp>
-#include <esokit/core/unroll.hpp>
-#include <esokit/math/dense.hpp>
+#include <esokit/math/detail/dense.hpp>
 #include <limits>
 
 namespace esokit {

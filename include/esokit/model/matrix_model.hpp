@@ -2,8 +2,8 @@
 /// MatrixModel: the common base of the models that are given by Phi and Gamma.
 #pragma once
 
+#include <esokit/core/detail/unroll.hpp>
 #include <esokit/core/matrix.hpp>
-#include <esokit/core/unroll.hpp>
 #include <esokit/model/model_parts.hpp>
 #include <esokit/model/sampled_model.hpp>
 

@@ -8,7 +8,7 @@
 #include <esokit/core/lanes.hpp>
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/scalar.hpp>
-#include <esokit/math/dense.hpp>
+#include <esokit/math/detail/dense.hpp>
 
 namespace esokit {
 

@@ -6,13 +6,13 @@
 #include <cmath>
 #include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
-#include <esokit/math/dense.hpp>
+#include <esokit/math/detail/dense.hpp>
 #include <esokit/model/augmented_model.hpp>
-#include <esokit/model/corrected_part.hpp>
+#include <esokit/model/detail/observable_part.hpp>
+#include <esokit/model/detail/parts_layout.hpp>
 #include <esokit/model/linear_plant.hpp>
 #include <esokit/model/matrix_model.hpp>
 #include <esokit/model/model_parts.hpp>
-#include <esokit/model/parts_shape.hpp>
 #include <limits>
 #include <string_view>
 

@@ -3,12 +3,12 @@
 #pragma once
 
 #include <concepts>
-#include <esokit/core/declared.hpp>
+#include <esokit/core/detail/declared_traits.hpp>
+#include <esokit/core/detail/unroll.hpp>
 #include <esokit/core/error.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/scalar.hpp>
-#include <esokit/core/unroll.hpp>
 
 namespace esokit {
 

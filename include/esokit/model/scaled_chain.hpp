@@ -2,9 +2,9 @@
 /// The sampled chain in Nordsieck scaling, in which the observers compute.
 #pragma once
 
+#include <esokit/core/detail/unroll.hpp>
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/scalar.hpp>
-#include <esokit/core/unroll.hpp>
 #include <esokit/math/combinatorics.hpp>
 
 namespace esokit {

@@ -6,7 +6,7 @@
 #pragma once
 
 #include <esokit/core/check.hpp>
-#include <esokit/core/type_tag.hpp>
+#include <esokit/core/detail/type_tag.hpp>
 #include <esokit/gain/switched_gain.hpp>
 #include <esokit/gain/switching_certificate.hpp>
 #include <esokit/observer/named_observer.hpp>

@@ -5,8 +5,8 @@
 #pragma once
 
 #include <esokit/core/check.hpp>
-#include <esokit/core/type_tag.hpp>
-#include <esokit/gain/algebraic_gain_design.hpp>
+#include <esokit/core/detail/type_tag.hpp>
+#include <esokit/gain/detail/algebraic_gain_design.hpp>
 #include <esokit/observer/named_observer.hpp>
 #include <esokit/observer/predictor_corrector.hpp>
 #include <optional>

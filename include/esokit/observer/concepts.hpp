@@ -15,11 +15,11 @@
 
 #include <concepts>
 #include <esokit/core/check.hpp>
-#include <esokit/core/declared.hpp>
+#include <esokit/core/detail/declared_traits.hpp>
 #include <esokit/core/lanes.hpp>
 #include <esokit/core/scalar.hpp>
+#include <esokit/core/step_status.hpp>
 #include <esokit/gain/gain_law.hpp>
-#include <esokit/gain/step_status.hpp>
 #include <type_traits>
 #include <utility>
 

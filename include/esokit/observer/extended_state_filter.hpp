@@ -7,9 +7,9 @@
 #include <concepts>
 #include <cstdint>
 #include <esokit/core/check.hpp>
-#include <esokit/core/type_tag.hpp>
+#include <esokit/core/detail/type_tag.hpp>
 #include <esokit/gain/constant_gain.hpp>
-#include <esokit/gain/filter_design.hpp>
+#include <esokit/gain/detail/filter_design.hpp>
 #include <esokit/gain/riccati_gain.hpp>
 #include <esokit/observer/named_observer.hpp>
 #include <esokit/observer/predictor_corrector.hpp>

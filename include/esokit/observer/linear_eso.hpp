@@ -4,7 +4,7 @@
 #pragma once
 
 #include <esokit/core/check.hpp>
-#include <esokit/core/type_tag.hpp>
+#include <esokit/core/detail/type_tag.hpp>
 #include <esokit/gain/constant_gain.hpp>
 #include <esokit/observer/named_observer.hpp>
 #include <esokit/observer/predictor_corrector.hpp>

@@ -4,11 +4,11 @@
 #pragma once
 
 #include <cmath>
-#include <esokit/gain/covariance_factor.hpp>
+#include <esokit/core/step_status.hpp>
+#include <esokit/gain/detail/covariance_factor.hpp>
+#include <esokit/gain/detail/noise_settings.hpp>
 #include <esokit/gain/mimo_filter_config.hpp>
 #include <esokit/gain/mimo_riccati.hpp>
-#include <esokit/gain/noise_settings.hpp>
-#include <esokit/gain/step_status.hpp>
 
 namespace esokit {
 

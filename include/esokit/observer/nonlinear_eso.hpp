@@ -5,7 +5,7 @@
 #pragma once
 
 #include <esokit/core/check.hpp>
-#include <esokit/core/type_tag.hpp>
+#include <esokit/core/detail/type_tag.hpp>
 #include <esokit/gain/nonlinear_gain_design.hpp>
 #include <esokit/observer/named_observer.hpp>
 #include <esokit/observer/predictor_corrector.hpp>

@@ -4,14 +4,14 @@
 
 #include <cstdint>
 #include <esokit/core/check.hpp>
+#include <esokit/core/detail/type_tag.hpp>
+#include <esokit/core/detail/unroll.hpp>
 #include <esokit/core/expected.hpp>
-#include <esokit/core/type_tag.hpp>
-#include <esokit/core/unroll.hpp>
+#include <esokit/core/step_status.hpp>
 #include <esokit/gain/gain_law.hpp>
-#include <esokit/gain/step_status.hpp>
 #include <esokit/model/chain_model.hpp>
 #include <esokit/observer/concepts.hpp>
-#include <esokit/observer/observed_levels.hpp>
+#include <esokit/observer/detail/observer_state.hpp>
 
 namespace esokit {
 

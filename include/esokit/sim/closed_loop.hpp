@@ -8,10 +8,10 @@
 #include <cstdint>
 #include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
+#include <esokit/core/step_status.hpp>
 #include <esokit/eigen.hpp>
-#include <esokit/gain/step_status.hpp>
+#include <esokit/sim/detail/loop_steps.hpp>
 #include <esokit/sim/disturbed_plant.hpp>
-#include <esokit/sim/loop_steps.hpp>
 #include <esokit/sim/runge_kutta.hpp>
 #include <esokit/sim/signal.hpp>
 #include <limits>

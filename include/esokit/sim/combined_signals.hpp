@@ -3,7 +3,7 @@
 #pragma once
 
 #include <cstddef>
-#include <esokit/core/unroll.hpp>
+#include <esokit/core/detail/unroll.hpp>
 #include <esokit/sim/signal.hpp>
 
 namespace esokit::sim {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <concepts>
 #include <esokit/core/check.hpp>
-#include <esokit/core/declared.hpp>
+#include <esokit/core/detail/declared_traits.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/scalar.hpp>

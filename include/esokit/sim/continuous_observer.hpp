@@ -4,10 +4,10 @@
 #pragma once
 
 #include <esokit/core/check.hpp>
+#include <esokit/core/detail/unroll.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/interval.hpp>
 #include <esokit/core/matrix.hpp>
-#include <esokit/core/unroll.hpp>
 #include <esokit/gain/half_gain.hpp>
 #include <esokit/gain/nonlinear_gain_design.hpp>
 #include <esokit/model/scaled_chain.hpp>

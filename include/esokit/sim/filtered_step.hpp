@@ -5,8 +5,8 @@
 #include <cmath>
 #include <cstddef>
 #include <esokit/core/check.hpp>
+#include <esokit/core/detail/unroll.hpp>
 #include <esokit/core/expected.hpp>
-#include <esokit/core/unroll.hpp>
 #include <esokit/math/combinatorics.hpp>
 #include <esokit/sim/signal.hpp>
 #include <limits>

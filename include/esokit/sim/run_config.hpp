@@ -8,9 +8,9 @@
 #include <esokit/core/check.hpp>
 #include <esokit/core/lanes.hpp>
 #include <esokit/model/linear_plant.hpp>
+#include <esokit/sim/detail/run_signal.hpp>
 #include <esokit/sim/plant.hpp>
-#include <esokit/sim/recording.hpp>
-#include <esokit/sim/run_signal.hpp>
+#include <esokit/sim/run_result.hpp>
 #include <functional>
 #include <optional>
 #include <type_traits>

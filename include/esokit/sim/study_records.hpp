@@ -11,7 +11,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <esokit/core/check.hpp>
-#include <esokit/core/compiled.hpp>
+#include <esokit/core/detail/compiled.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/sim/statistics.hpp>
 #include <istream>

@@ -3,7 +3,7 @@
 #pragma once
 
 #include <esokit/core/scalar.hpp>
-#include <esokit/math/fine_sum.hpp>
+#include <esokit/math/detail/fine_sum.hpp>
 #include <esokit/sim/window.hpp>
 
 namespace esokit::sim {

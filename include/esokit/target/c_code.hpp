@@ -2,10 +2,10 @@
 /// to_c: a finished controller or observer as C99, written from its recorded calls.
 #pragma once
 
-#include <esokit/core/compiled.hpp>
+#include <esokit/core/detail/compiled.hpp>
 #include <esokit/core/expected.hpp>
-#include <esokit/target/recorded_design.hpp>
-#include <esokit/target/writable.hpp>
+#include <esokit/target/detail/recorded_design.hpp>
+#include <esokit/target/detail/writable.hpp>
 #include <string>
 
 namespace esokit {

@@ -5,9 +5,9 @@
 #include <array>
 #include <cstdint>
 #include <esokit/core/check.hpp>
-#include <esokit/target/fixed_bounds.hpp>
-#include <esokit/target/integer_list.hpp>
-#include <esokit/target/recorded_design.hpp>
+#include <esokit/target/detail/fixed_bounds.hpp>
+#include <esokit/target/detail/integer_list.hpp>
+#include <esokit/target/detail/recorded_design.hpp>
 #include <map>
 #include <vector>
 

@@ -4,11 +4,11 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <esokit/core/compiled.hpp>
+#include <esokit/core/detail/compiled.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/target/c_code.hpp>
-#include <esokit/target/fixed_design.hpp>
-#include <esokit/target/runtime_text.hpp>
+#include <esokit/target/detail/fixed_design.hpp>
+#include <esokit/target/detail/runtime_text.hpp>
 #include <vector>
 
 namespace esokit {

@@ -7,7 +7,7 @@
 #include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/lanes.hpp>
-#include <esokit/target/recording.hpp>
+#include <esokit/target/recording_scalar.hpp>
 #include <functional>
 #include <type_traits>
 #include <utility>

@@ -3,12 +3,12 @@
 /// from its C.
 #pragma once
 
-#include <esokit/core/compiled.hpp>
+#include <esokit/core/detail/compiled.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/target/c_code.hpp>
-#include <esokit/target/list_writer.hpp>
-#include <esokit/target/recorded_design.hpp>
-#include <esokit/target/st_translator.hpp>
+#include <esokit/target/detail/list_writer.hpp>
+#include <esokit/target/detail/recorded_design.hpp>
+#include <esokit/target/detail/st_translator.hpp>
 #include <string>
 
 namespace esokit {

@@ -6,10 +6,10 @@
 #include <esokit/control/time_proportioned.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/target/c_code.hpp>
-#include <esokit/target/list_writer.hpp>
-#include <esokit/target/record_access.hpp>
-#include <esokit/target/recorded_design.hpp>
-#include <esokit/target/runtime_text.hpp>
+#include <esokit/target/detail/list_writer.hpp>
+#include <esokit/target/detail/record_access.hpp>
+#include <esokit/target/detail/recorded_design.hpp>
+#include <esokit/target/detail/runtime_text.hpp>
 #include <esokit/target/structured_text.hpp>
 #include <string>
 

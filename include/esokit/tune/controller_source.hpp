@@ -2,7 +2,7 @@
 /// A tuned controller as C++ source.
 #pragma once
 
-#include <esokit/core/compiled.hpp>
+#include <esokit/core/detail/compiled.hpp>
 #include <esokit/tune/families.hpp>
 #include <esokit/tune/specification.hpp>
 #include <esokit/tune/tuning.hpp>

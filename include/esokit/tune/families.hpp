@@ -4,9 +4,9 @@
 #pragma once
 
 #include <complex>
-#include <esokit/analysis/controllers.hpp>
+#include <esokit/analysis/library_systems.hpp>
 #include <esokit/analysis/poles.hpp>
-#include <esokit/core/compiled.hpp>
+#include <esokit/core/detail/compiled.hpp>
 #include <esokit/gain/half_gain.hpp>
 #include <esokit/gain/model_gain.hpp>
 #include <esokit/gain/pole_set.hpp>

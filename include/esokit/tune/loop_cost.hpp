@@ -27,7 +27,7 @@
 #include <esokit/analysis/delay_margin.hpp>
 #include <esokit/analysis/linear_controller.hpp>
 #include <esokit/analysis/poles.hpp>
-#include <esokit/core/compiled.hpp>
+#include <esokit/core/detail/compiled.hpp>
 #include <esokit/tune/specification.hpp>
 #include <limits>
 #include <vector>

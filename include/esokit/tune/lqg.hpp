@@ -9,8 +9,8 @@
 
 #include <esokit/analysis/linear_controller.hpp>
 #include <esokit/analysis/loop.hpp>
-#include <esokit/core/compiled.hpp>
-#include <esokit/math/dense.hpp>
+#include <esokit/core/detail/compiled.hpp>
+#include <esokit/math/detail/dense.hpp>
 #include <esokit/tune/specification.hpp>
 
 namespace esokit {

@@ -9,8 +9,8 @@
 #include <cstddef>
 #include <esokit/analysis/linear_controller.hpp>
 #include <esokit/analysis/loop.hpp>
-#include <esokit/control/softening.hpp>
-#include <esokit/core/compiled.hpp>
+#include <esokit/control/detail/softening.hpp>
+#include <esokit/core/detail/compiled.hpp>
 #include <esokit/sim/gaussian.hpp>
 #include <esokit/tune/specification.hpp>
 #include <functional>

@@ -8,7 +8,7 @@
 /// it.
 #pragma once
 
-#include <esokit/core/compiled.hpp>
+#include <esokit/core/detail/compiled.hpp>
 #include <esokit/tune/pid_conversion.hpp>
 #include <esokit/tune/plain_pid.hpp>
 #include <esokit/tune/tune.hpp>

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <esokit/core/check.hpp>
-#include <esokit/core/compiled.hpp>
+#include <esokit/core/detail/compiled.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/scalar.hpp>
 

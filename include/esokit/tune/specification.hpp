@@ -7,7 +7,7 @@
 #include <cmath>
 #include <esokit/analysis/loop.hpp>
 #include <esokit/core/check.hpp>
-#include <esokit/core/compiled.hpp>
+#include <esokit/core/detail/compiled.hpp>
 #include <esokit/identify/identify.hpp>
 #include <optional>
 #include <vector>

@@ -23,15 +23,15 @@
 #pragma once
 
 #include <cmath>
-#include <esokit/core/compiled.hpp>
+#include <esokit/core/detail/compiled.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/tune/controller_source.hpp>
+#include <esokit/tune/detail/family_search.hpp>
 #include <esokit/tune/families.hpp>
 #include <esokit/tune/loop_cost.hpp>
 #include <esokit/tune/lqg.hpp>
 #include <esokit/tune/overload.hpp>
 #include <esokit/tune/specification.hpp>
-#include <esokit/tune/tune_search.hpp>
 #include <esokit/tune/tuning.hpp>
 #include <functional>
 #include <string>

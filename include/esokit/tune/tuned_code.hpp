@@ -5,7 +5,7 @@
 #include <esokit/core/expected.hpp>
 #include <esokit/target/c_code.hpp>
 #include <esokit/target/structured_text.hpp>
-#include <esokit/tune/controller.hpp>
+#include <esokit/tune/tuned_controller.hpp>
 #include <string>
 
 namespace esokit {

@@ -2,8 +2,8 @@
 /// Tuning: the designs of `tune` with their numbers, and what speaks against them.
 #pragma once
 
-#include <esokit/analysis/controllers.hpp>
-#include <esokit/core/compiled.hpp>
+#include <esokit/analysis/library_systems.hpp>
+#include <esokit/core/detail/compiled.hpp>
 #include <esokit/tune/families.hpp>
 #include <esokit/tune/loop_cost.hpp>
 #include <esokit/tune/overload.hpp>

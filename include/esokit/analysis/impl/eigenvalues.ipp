@@ -2,9 +2,9 @@
 
 #include <cmath>
 #include <complex>
-#include <esokit/analysis/eigenvalues.hpp>
+#include <esokit/analysis/detail/eigenvalues.hpp>
 #include <esokit/core/scalar.hpp>
-#include <esokit/math/dense.hpp>
+#include <esokit/math/detail/dense.hpp>
 #include <utility>
 
 namespace esokit::detail {

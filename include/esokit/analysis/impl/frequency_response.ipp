@@ -4,7 +4,7 @@
 #include <complex>
 #include <esokit/analysis/frequency_response.hpp>
 #include <esokit/analysis/linear_system.hpp>
-#include <esokit/math/dense.hpp>
+#include <esokit/math/detail/dense.hpp>
 #include <numbers>
 #include <utility>
 

@@ -4,10 +4,10 @@
 #include <esokit/analysis/dynamic_matrix.hpp>
 #include <esokit/analysis/linear_system.hpp>
 #include <esokit/core/check.hpp>
+#include <esokit/core/detail/unroll.hpp>
 #include <esokit/core/error.hpp>
 #include <esokit/core/expected.hpp>
-#include <esokit/core/unroll.hpp>
-#include <esokit/math/dense.hpp>
+#include <esokit/math/detail/dense.hpp>
 
 namespace esokit {
 

@@ -3,9 +3,9 @@
 #include <cmath>
 #include <complex>
 #include <cstddef>
-#include <esokit/analysis/controllers.hpp>
 #include <esokit/analysis/dynamic_matrix.hpp>
 #include <esokit/analysis/frequency_response.hpp>
+#include <esokit/analysis/library_systems.hpp>
 #include <esokit/analysis/linear_controller.hpp>
 #include <esokit/analysis/loop.hpp>
 #include <esokit/analysis/poles.hpp>

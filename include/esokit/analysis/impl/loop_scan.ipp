@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <esokit/analysis/detail/loop_scan.hpp>
 #include <esokit/analysis/loop.hpp>
-#include <esokit/analysis/loop_scan.hpp>
 #include <limits>
 #include <numbers>
 #include <vector>

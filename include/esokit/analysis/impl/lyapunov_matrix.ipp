@@ -3,7 +3,7 @@
 #include <cmath>
 #include <esokit/analysis/lyapunov.hpp>
 #include <esokit/analysis/lyapunov_matrix.hpp>
-#include <esokit/math/dense.hpp>
+#include <esokit/math/detail/dense.hpp>
 
 namespace esokit {
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <esokit/analysis/loop_scan.hpp>
+#include <esokit/analysis/detail/loop_scan.hpp>
 #include <esokit/analysis/margins.hpp>
 #include <esokit/core/interval.hpp>
 #include <limits>

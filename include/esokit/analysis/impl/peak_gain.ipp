@@ -3,7 +3,7 @@
 #include <cmath>
 #include <esokit/analysis/peak_gain.hpp>
 #include <esokit/analysis/poles.hpp>
-#include <esokit/math/dense.hpp>
+#include <esokit/math/detail/dense.hpp>
 
 namespace esokit {
 

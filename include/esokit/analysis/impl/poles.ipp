@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <esokit/analysis/eigenvalues.hpp>
+#include <esokit/analysis/detail/eigenvalues.hpp>
 #include <esokit/analysis/linear_system.hpp>
 #include <esokit/analysis/poles.hpp>
 #include <limits>

@@ -5,11 +5,11 @@
 #include <cmath>
 #include <cstddef>
 #include <esokit/core/scalar.hpp>
+#include <esokit/identify/detail/timed_column.hpp>
 #include <esokit/identify/fit.hpp>
 #include <esokit/identify/impl/innovations_filter.ipp>
 #include <esokit/identify/spectrum.hpp>
-#include <esokit/identify/timed_column.hpp>
-#include <esokit/math/dense.hpp>
+#include <esokit/math/detail/dense.hpp>
 #include <span>
 #include <type_traits>
 #include <utility>

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <esokit/identify/detail/b0_evidence.hpp>
+#include <esokit/identify/detail/intervals.hpp>
+#include <esokit/identify/detail/order_selection.hpp>
 #include <esokit/identify/fit.hpp>
-#include <esokit/identify/gain_evidence.hpp>
 #include <esokit/identify/identified.hpp>
-#include <esokit/identify/intervals.hpp>
-#include <esokit/identify/order_fits.hpp>
 #include <esokit/identify/plateau.hpp>
 #include <esokit/identify/second_opinion.hpp>
 #include <limits>

@@ -6,10 +6,10 @@
 #include <complex>
 #include <cstddef>
 #include <esokit/core/scalar.hpp>
+#include <esokit/identify/detail/timed_column.hpp>
 #include <esokit/identify/innovations_filter.hpp>
 #include <esokit/identify/spectrum.hpp>
-#include <esokit/identify/timed_column.hpp>
-#include <esokit/math/dense.hpp>
+#include <esokit/math/detail/dense.hpp>
 #include <memory>
 #include <numbers>
 #include <utility>

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <esokit/identify/detail/intervals.hpp>
 #include <esokit/identify/fit.hpp>
 #include <esokit/identify/input_checks.hpp>
-#include <esokit/identify/intervals.hpp>
 #include <limits>
 #include <utility>
 #include <vector>

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <cstddef>
 #include <esokit/core/scalar.hpp>
+#include <esokit/identify/detail/intervals.hpp>
 #include <esokit/identify/fit.hpp>
-#include <esokit/identify/intervals.hpp>
 #include <numbers>
 #include <utility>
 #include <vector>

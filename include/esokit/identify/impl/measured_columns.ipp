@@ -5,9 +5,9 @@
 #include <cstddef>
 #include <esokit/core/check.hpp>
 #include <esokit/core/error.hpp>
+#include <esokit/identify/detail/timed_column.hpp>
 #include <esokit/identify/fit.hpp>
 #include <esokit/identify/measured_columns.hpp>
-#include <esokit/identify/timed_column.hpp>
 #include <esokit/model/measured_input.hpp>
 #include <span>
 #include <utility>

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <cstddef>
 #include <esokit/core/scalar.hpp>
+#include <esokit/identify/detail/order_selection.hpp>
 #include <esokit/identify/fit.hpp>
 #include <esokit/identify/identified.hpp>
-#include <esokit/identify/order_fits.hpp>
 #include <limits>
 #include <numbers>
 #include <optional>

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <esokit/identify/detail/intervals.hpp>
 #include <esokit/identify/fit.hpp>
-#include <esokit/identify/intervals.hpp>
 #include <esokit/identify/plateau.hpp>
 #include <limits>
 #include <vector>

@@ -1,8 +1,8 @@
 #pragma once
 
 #include <algorithm>
+#include <esokit/identify/detail/intervals.hpp>
 #include <esokit/identify/fit.hpp>
-#include <esokit/identify/intervals.hpp>
 #include <esokit/identify/second_opinion.hpp>
 #include <vector>
 

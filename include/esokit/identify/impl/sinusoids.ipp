@@ -4,8 +4,8 @@
 #include <cmath>
 #include <complex>
 #include <cstddef>
+#include <esokit/identify/detail/intervals.hpp>
 #include <esokit/identify/fit.hpp>
-#include <esokit/identify/intervals.hpp>
 #include <esokit/identify/sinusoids.hpp>
 #include <esokit/identify/spectrum.hpp>
 #include <numbers>

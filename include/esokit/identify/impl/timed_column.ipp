@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <esokit/core/language.hpp>
-#include <esokit/identify/timed_column.hpp>
+#include <esokit/identify/detail/timed_column.hpp>
 #include <vector>
 
 namespace esokit {

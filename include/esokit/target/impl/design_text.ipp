@@ -7,8 +7,8 @@
 #include <cstdint>
 #include <cstdio>
 #include <esokit/core/version.hpp>
-#include <esokit/target/design_text.hpp>
-#include <esokit/target/linear_call.hpp>
+#include <esokit/target/detail/design_text.hpp>
+#include <esokit/target/detail/linear_call.hpp>
 #include <limits>
 #include <string>
 #include <vector>

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstddef>
 #include <esokit/core/language.hpp>
-#include <esokit/target/fixed_bounds.hpp>
+#include <esokit/target/detail/fixed_bounds.hpp>
 #include <utility>
 #include <vector>
 

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <esokit/target/fixed_bounds.hpp>
-#include <esokit/target/fixed_builder.hpp>
-#include <esokit/target/fixed_record.hpp>
-#include <esokit/target/integer_list.hpp>
-#include <esokit/target/recorded_design.hpp>
+#include <esokit/target/detail/fixed_bounds.hpp>
+#include <esokit/target/detail/fixed_builder.hpp>
+#include <esokit/target/detail/fixed_record.hpp>
+#include <esokit/target/detail/integer_list.hpp>
+#include <esokit/target/detail/recorded_design.hpp>
 #include <vector>
 
 namespace esokit::detail {

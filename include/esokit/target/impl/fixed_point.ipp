@@ -7,10 +7,10 @@
 #include <cstdio>
 #include <esokit/core/expected.hpp>
 #include <esokit/target/c_code.hpp>
-#include <esokit/target/design_text.hpp>
-#include <esokit/target/fixed_design.hpp>
+#include <esokit/target/detail/design_text.hpp>
+#include <esokit/target/detail/fixed_design.hpp>
+#include <esokit/target/detail/runtime_text.hpp>
 #include <esokit/target/fixed_point.hpp>
-#include <esokit/target/runtime_text.hpp>
 #include <string>
 #include <vector>
 

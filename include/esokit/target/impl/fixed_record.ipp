@@ -4,11 +4,11 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <esokit/target/fixed_bounds.hpp>
-#include <esokit/target/fixed_record.hpp>
-#include <esokit/target/integer_list.hpp>
-#include <esokit/target/linear_call.hpp>
-#include <esokit/target/recorded_design.hpp>
+#include <esokit/target/detail/fixed_bounds.hpp>
+#include <esokit/target/detail/fixed_record.hpp>
+#include <esokit/target/detail/integer_list.hpp>
+#include <esokit/target/detail/linear_call.hpp>
+#include <esokit/target/detail/recorded_design.hpp>
 #include <vector>
 
 namespace esokit::detail {

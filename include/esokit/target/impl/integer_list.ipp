@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <esokit/core/language.hpp>
-#include <esokit/target/integer_list.hpp>
+#include <esokit/target/detail/integer_list.hpp>
 #include <string>
 #include <vector>
 

@@ -2,11 +2,11 @@
 
 #include <cmath>
 #include <cstddef>
-#include <esokit/target/fixed_bounds.hpp>
+#include <esokit/target/detail/fixed_bounds.hpp>
+#include <esokit/target/detail/integer_list.hpp>
+#include <esokit/target/detail/linear_call.hpp>
+#include <esokit/target/detail/recorded_design.hpp>
 #include <esokit/target/fixed_options.hpp>
-#include <esokit/target/integer_list.hpp>
-#include <esokit/target/linear_call.hpp>
-#include <esokit/target/recorded_design.hpp>
 #include <vector>
 
 namespace esokit::detail {

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdio>
-#include <esokit/target/list_writer.hpp>
+#include <esokit/target/detail/list_writer.hpp>
 #include <esokit/target/recorder.hpp>
 #include <string>
 #include <vector>

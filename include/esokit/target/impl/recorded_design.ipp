@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <cstddef>
 #include <esokit/core/expected.hpp>
-#include <esokit/target/record_access.hpp>
-#include <esokit/target/recorded_design.hpp>
-#include <esokit/target/recorded_numbers.hpp>
+#include <esokit/target/detail/record_access.hpp>
+#include <esokit/target/detail/recorded_design.hpp>
+#include <esokit/target/detail/recorded_numbers.hpp>
+#include <esokit/target/detail/writable.hpp>
+#include <esokit/target/detail/written_names.hpp>
 #include <esokit/target/recorder.hpp>
-#include <esokit/target/writable.hpp>
-#include <esokit/target/written_names.hpp>
 #include <string>
 #include <string_view>
 #include <utility>

@@ -3,8 +3,8 @@
 #include <cctype>
 #include <cstddef>
 #include <esokit/core/language.hpp>
-#include <esokit/target/runtime_text.hpp>
-#include <esokit/target/written_names.hpp>
+#include <esokit/target/detail/runtime_text.hpp>
+#include <esokit/target/detail/written_names.hpp>
 #include <string>
 #include <string_view>
 #include <vector>

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdlib>
-#include <esokit/target/list_writer.hpp>
-#include <esokit/target/st_translator.hpp>
-#include <esokit/target/written_names.hpp>
+#include <esokit/target/detail/list_writer.hpp>
+#include <esokit/target/detail/st_translator.hpp>
+#include <esokit/target/detail/written_names.hpp>
 #include <map>
 #include <set>
 #include <string>

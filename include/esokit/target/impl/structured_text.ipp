@@ -2,10 +2,10 @@
 
 #include <esokit/core/expected.hpp>
 #include <esokit/target/c_code.hpp>
-#include <esokit/target/design_text.hpp>
-#include <esokit/target/list_writer.hpp>
-#include <esokit/target/recorded_design.hpp>
-#include <esokit/target/st_translator.hpp>
+#include <esokit/target/detail/design_text.hpp>
+#include <esokit/target/detail/list_writer.hpp>
+#include <esokit/target/detail/recorded_design.hpp>
+#include <esokit/target/detail/st_translator.hpp>
 #include <esokit/target/structured_text.hpp>
 #include <string>
 

@@ -4,8 +4,8 @@
 #include <cctype>
 #include <cstddef>
 #include <esokit/core/check.hpp>
-#include <esokit/target/recorded_numbers.hpp>
-#include <esokit/target/written_names.hpp>
+#include <esokit/target/detail/recorded_numbers.hpp>
+#include <esokit/target/detail/written_names.hpp>
 #include <set>
 #include <string>
 #include <string_view>

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <complex>
 #include <cstddef>
-#include <esokit/analysis/controllers.hpp>
+#include <esokit/analysis/library_systems.hpp>
 #include <esokit/analysis/poles.hpp>
 #include <esokit/gain/half_gain.hpp>
 #include <esokit/gain/model_gain.hpp>

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <esokit/analysis/linear_controller.hpp>
 #include <esokit/analysis/loop.hpp>
-#include <esokit/math/dense.hpp>
+#include <esokit/math/detail/dense.hpp>
 #include <esokit/tune/lqg.hpp>
 #include <esokit/tune/specification.hpp>
 

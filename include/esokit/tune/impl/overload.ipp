@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <esokit/analysis/linear_controller.hpp>
 #include <esokit/analysis/loop.hpp>
-#include <esokit/control/softening.hpp>
+#include <esokit/control/detail/softening.hpp>
 #include <esokit/tune/overload.hpp>
 #include <esokit/tune/specification.hpp>
 #include <utility>

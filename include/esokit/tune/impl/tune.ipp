@@ -7,13 +7,13 @@
 #include <cstdio>
 #include <esokit/core/expected.hpp>
 #include <esokit/tune/controller_source.hpp>
+#include <esokit/tune/detail/family_search.hpp>
 #include <esokit/tune/impl/families.ipp>
 #include <esokit/tune/loop_cost.hpp>
 #include <esokit/tune/lqg.hpp>
 #include <esokit/tune/overload.hpp>
 #include <esokit/tune/specification.hpp>
 #include <esokit/tune/tune.hpp>
-#include <esokit/tune/tune_search.hpp>
 #include <esokit/tune/tuning.hpp>
 #include <functional>
 #include <limits>

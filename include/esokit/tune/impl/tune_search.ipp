@@ -5,12 +5,12 @@
 #include <complex>
 #include <cstddef>
 #include <esokit/tune/controller_source.hpp>
+#include <esokit/tune/detail/family_search.hpp>
+#include <esokit/tune/detail/search.hpp>
 #include <esokit/tune/families.hpp>
 #include <esokit/tune/loop_cost.hpp>
 #include <esokit/tune/lqg.hpp>
-#include <esokit/tune/search.hpp>
 #include <esokit/tune/specification.hpp>
-#include <esokit/tune/tune_search.hpp>
 #include <esokit/tune/tuning.hpp>
 #include <limits>
 #include <utility>

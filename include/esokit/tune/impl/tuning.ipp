@@ -2,7 +2,7 @@
 
 #include <cstddef>
 #include <cstdio>
-#include <esokit/analysis/controllers.hpp>
+#include <esokit/analysis/library_systems.hpp>
 #include <esokit/tune/families.hpp>
 #include <esokit/tune/loop_cost.hpp>
 #include <esokit/tune/overload.hpp>

@@ -1,0 +1,590 @@
+/// @file
+/// recorded_design: all that a text of another language needs of a finished controller or
+/// observer, recorded from its own calls.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <esokit/core/detail/compiled.hpp>
+#include <esokit/core/expected.hpp>
+#include <esokit/target/detail/record_access.hpp>
+#include <esokit/target/detail/recorded_numbers.hpp>
+#include <esokit/target/detail/writable.hpp>
+#include <esokit/target/detail/written_names.hpp>
+#include <esokit/target/recorder.hpp>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+namespace esokit {
+
+namespace detail {
+
+/// The rules for the options. @param takes_motion whether there is a law that takes r', ..
+template <class V>
+[[nodiscard]] Rules<V> checked_options(const CodeOptions& options, bool takes_motion = true) {
+  Rules<V> rules;
+  constexpr const char* identifier =
+      "must be an identifier of C: this is the place of its first wrong character";
+  const int in_name = wrong_place(options.name);
+  const int in_settings = wrong_place(options.settings_name);
+  rules.demand(in_name == 0, "name", static_cast<V>(in_name), identifier)
+      .demand(has_small_letter(options.name), "name", V(0),
+              "must have a small letter: in capitals it begins the constants of another name")
+      .demand(!is_header_of_c(options.name), "name", V(0),
+              "is that of a header of the C library: name.h would be taken for it")
+      .demand(in_settings == 0, "settings_name", static_cast<V>(in_settings), identifier)
+      .demand(1 <= options.self_test_samples && options.self_test_samples <= 10000,
+              "self_test_samples", static_cast<V>(options.self_test_samples), "must be 1 .. 10000")
+      .demand(!leaves_comment(options.comment), "comment", V(0),
+              "must not begin or end a comment, nor a line of it with a backslash")
+      .demand(
+          takes_motion || !options.moving_reference, "moving_reference", V(1),
+          "needs a law that takes r', ..: Adrc, not of the error-based form, or PredictiveAdrc");
+  return rules;
+}
+
+/// The observer of a recorded subject, one type for all subjects.
+/// @{
+struct OfController {
+  template <class C>
+  auto& operator()(C& c) const {
+    return c.observer();
+  }
+};
+
+struct OfPredictive {
+  template <class C>
+  auto& operator()(C& c) const {
+    return RecordAccess::observer_of(c);
+  }
+};
+
+struct Itself {
+  template <class O>
+  auto& operator()(O& o) const {
+    return o;
+  }
+};
+
+struct NoName {
+  template <class O, class Number>
+  std::string operator()(const O&, const Number*) const {
+    return {};
+  }
+};
+
+/// @}
+
+/// Notes a call. @param arguments their names, with blanks between @return how many there are
+int note_call(RecordedDesign& design, std::string_view name, std::string_view arguments,
+              bool has_output);
+
+/// Names a number of the object that has perhaps a name. @param level of a state, or -1, in its
+/// row @param published its place among those, or -1 @param setting begins the name of a setting
+/// @return whether it is read from outside
+bool name_number(RecordedDesign& design, std::string name, int level, int row, bool first,
+                 int published, const char* setting);
+
+/// Where the law of an angle subtracts an estimate from the reference, the difference becomes its
+/// argument: the text takes off whole turns. A law on physical estimates gets a reference without
+/// them. @return false where it does not
+bool take_angle(RecordedDesign& design);
+
+/// Records a subject without its adapter.
+/// @tparam Subject the observer or controller @tparam Observer its observer, perhaps itself
+template <class Subject, class Observer>
+class DesignRecorder {
+ public:
+  using V = typename Observer::scalar_type;
+  using Number = typename Recorder<Subject>::Number;
+  using Numbers = std::vector<Number>;
+  using Core = CoreOf<Observer>;
+  static constexpr int size = Observer::size;
+  static constexpr int gains = size * Observer::levels;
+
+  DesignRecorder(const Subject& subject, const CodeOptions& options)
+      : subject_(subject), recorder_(subject) {
+    design.options = options;
+    design.single = sizeof(V) == sizeof(float);
+  }
+
+  RecordedDesign design;
+
+  /// A call without memory of its own: as a pointer it takes no code beside its own.
+  using Plain = Numbers (*)(typename Recorder<Subject>::Recorded&, const Numbers&);
+  void add(std::string_view name, std::string_view arguments, bool has_output, Plain call) {
+    add_bound(name, arguments, has_output, call);
+  }
+  void add_bound(std::string_view name, std::string_view arguments, bool has_output,
+                 typename Recorder<Subject>::Call call) {
+    recorder_.add(note_call(design, name, arguments, has_output), std::move(call));
+  }
+
+  /// Records the calls of the observer, names the numbers. @param of the observer of a recorded
+  /// subject @param name_of gives the name of a number, or ""
+  template <class Of, class NameOf>
+  [[nodiscard]] Check<V> record(const Of& of, const NameOf& name_of) {
+    // Without one nothing is rejected.
+    design.wrap.gated = design.wrap.gated && (design.gate.threshold > 0 || design.law.watches);
+    add_observer(of);
+    const auto closed = recorder_.record();
+    if (!closed) return closed.error();
+    auto recorded = closed;
+    if (design.options.settings_in_struct) {
+      if (!design.gain_is_kept) {
+        return Error<V>{"settings_in_struct", V(1),
+                        "needs gains that depend neither on the innovation nor on the time"};
+      }
+      if (design.softens) {
+        return Error<V>{"settings_in_struct", V(1), "is not written for a law that softens"};
+      }
+      recorder_.keep_open([](auto& c) {
+        std::vector<std::pair<const Number*, const char*>> found;
+        RecordAccess::find_settings<Number>(c, found);
+        std::vector<const Number*> numbers;
+        for (const auto& [number, name] : found) numbers.push_back(number);
+        return numbers;
+      });
+      recorded = recorder_.record();
+      if (!recorded) return recorded.error();
+      for (std::size_t i = 0; i < closed->moves.size(); ++i) {
+        design.settings.push_back(recorded->moves[i] && !closed->moves[i]);
+      }
+    }
+    auto object = Recorder<Subject>::as_recorded(subject_);
+    const auto numbers = numbers_of<Number>(object);
+    auto& core = RecordAccess::core(of(object));
+    const Number* first = &core.predicted_measurement();
+    using Model = typename Core::PlantModel;
+    std::vector<std::pair<const Number*, const char*>> settings;
+    if (!design.settings.empty()) RecordAccess::find_settings<Number>(object, settings);
+    ListWriter writer(c_language, design.single);
+    writer.live.assign(numbers.size(), false);
+    for (std::size_t i = 0; i < numbers.size(); ++i) {
+      const auto state = numbers[i] - first;
+      std::string name = name_of(object, numbers[i]);
+      if (numbers[i] == &core.applied_input()) {
+        name = "u_applied";
+      } else if (numbers[i] == &of(object).applied_input()) {
+        name = "u_given";  // without what is known
+      }
+      if (numbers[i] == &core.innovation()) name = "innovation";
+      int level = -1;
+      int row = 0;
+      if (0 <= state && state < gains) {
+        level = static_cast<int>(state) / size;
+        while (Model::state_of_row(row) != state % size) ++row;
+      }
+      const char* setting = nullptr;
+      for (const auto& [number, begins] : settings) {
+        if (setting == nullptr && number == numbers[i]) setting = begins;
+      }
+      writer.live[i] = name_number(design, std::move(name), level, row, state == 0,
+                                   RecordAccess::place_in_published(core, numbers[i]), setting);
+    }
+    writer.find_live(*recorded);
+    design.live = writer.live;
+    design.numbers = recorded->numbers;
+    for (const auto& call : recorded->calls) design.calls.push_back(call[0]);
+    if (auto ok = take_angle(); !ok) return ok;
+    return take_gains(RecordAccess::core(of(subject_)));
+  }
+
+ private:
+  template <class OfAny>
+  void add_observer(const OfAny& of_any) {
+    using Law = std::remove_cvref_t<decltype(RecordAccess::laws(std::declval<const Core&>())[0])>;
+    constexpr RunningLaw runs = RecordAccess::kind_of<Law>;
+    static constexpr auto all_of = [](auto& c) -> auto& {
+      return RecordAccess::at_rest(OfAny{}(c));
+    };
+    static constexpr auto of = [](auto& c) -> auto& { return RecordAccess::core(all_of(c)); };
+    if constexpr (RecordAccess::knows<Observer>) {
+      add("drive", "u", true, [](auto& c, const Numbers& in) {
+        return Numbers{RecordAccess::driven(all_of(c), in[0])};
+      });
+    }
+    design.gain_is_kept = runs == RunningLaw::none && gain_law_traits<Law>.kind == GainKind::preset;
+    if constexpr (runs != RunningLaw::none) {
+      using Recorded = std::remove_cvref_t<decltype(RecordAccess::laws(
+          RecordAccess::core(of_any(std::declval<typename Recorder<Subject>::Recorded&>())))[0])>;
+      RecordAccess::add_law<Recorded>(
+          [&]<class Call>(std::string_view name, std::string_view arguments, const Call&) {
+            constexpr bool has_output =
+                !std::is_void_v<std::invoke_result_t<Call, Recorded&, const Numbers&>>;
+            add(name, arguments, has_output, [](auto& c, const Numbers& in) {
+              auto& law = RecordAccess::laws(RecordAccess::core(OfAny{}(c)))[0];
+              if constexpr (has_output) {
+                return Numbers{Call{}(law, in)};
+              } else {
+                Call{}(law, in);
+                return Numbers{};
+              }
+            });
+          });
+    }
+    if constexpr (runs == RunningLaw::schedule) {
+      add("correct_long", "y contraction samples", false, [](auto& c, const Numbers& in) {
+        const EqualSampledPoles<size, Number> poles{in[1]};
+        RecordAccess::correct(
+            of(c), in[0],
+            Array<ScaledGain<size, Number>, 1>{long_step_gain<size, Number>(poles, in[2])});
+        return Numbers{};
+      });
+    }
+    if constexpr (runs == RunningLaw::filter) {
+      if (design.law.watches) {
+        add("is_inlier", "y", false, [](auto& c, const Numbers& in) {
+          RecordAccess::judge(of(c), in[0]);
+          return Numbers{};
+        });
+      }
+    }
+    if constexpr (ShiftableOutput<Core>) {
+      if (design.wrap.period > 0) {
+        add("shift", "offset", false, [](auto& c, const Numbers& in) {
+          (void)of(c).shift_output(in[0]);
+          return Numbers{};
+        });
+      }
+    }
+    if constexpr (ShiftableLoad<Core>) {
+      if (design.measured.on) {
+        const auto column = RecordAccess::load_column(RecordAccess::core(of_any(subject_)));
+        add_bound("load", "offset", false, [column](auto& c, const Numbers& in) {
+          RecordAccess::load(of(c), column, in[0]);
+          return Numbers{};
+        });
+      }
+    }
+    if constexpr (model_traits<typename Core::PlantModel>.is_chain && size == Observer::order + 1) {
+      if (design.guard.on) {
+        add("predicted_y", numbered("x", size) + " u", true, [](auto& c, const Numbers& in) {
+          return Numbers{RecordAccess::predicted_y(of(c), in)};
+        });
+        add("stand_at", "y " + numbered("d", Observer::levels), false,
+            [](auto& c, const Numbers& in) {
+              RecordAccess::stand_at(of(c), in);
+              return Numbers{};
+            });
+        if (design.guard.by_input) {
+          add("scale_found", "change", false, [](auto& c, const Numbers& in) {
+            RecordAccess::scale_found(of(c), in[0]);
+            return Numbers{};
+          });
+          add("scaled_bound", "bound", true, [](auto& c, const Numbers& in) {
+            return Numbers{of(c).model().scaled_disturbance(in[0])};
+          });
+        }
+      }
+    }
+    add("observe", "y u", false, [](auto& c, const Numbers& in) {
+      (void)of(c).update(in[0], in[1]);
+      return Numbers{};
+    });
+    add("predict_step", "u", false, [](auto& c, const Numbers& in) {
+      (void)of(c).predict(in[0]);
+      return Numbers{};
+    });
+    if constexpr (runs == RunningLaw::none)
+      add("correct_by", "y " + numbered("k", gains), false, [](auto& c, const Numbers& in) {
+        Array<ScaledGain<size, Number>, Observer::levels> given{};
+        std::size_t next = 1;
+        for (auto& level : given) {
+          for (Number& k : level) k = in[next++];
+        }
+        RecordAccess::correct(of(c), in[0], given);
+        return Numbers{};
+      });
+    if (!design.gain_is_kept) {
+      add("correct_step", "y", false, [](auto& c, const Numbers& in) {
+        (void)of(c).correct(in[0]);
+        return Numbers{};
+      });
+    }
+    add("restart_at", "y", false, [](auto& c, const Numbers& in) {
+      (void)of(c).reset(in[0]);
+      return Numbers{};
+    });
+    unroll<size>([&](auto row) {
+      add("estimate_" + std::to_string(int{row}), "", true, [](auto& c, const Numbers&) {
+        return Numbers{RecordAccess::estimate<int{decltype(row)::value}>(all_of(c))};
+      });
+    });
+  }
+
+  /// `take_angle` where the law is of an angle.
+  [[nodiscard]] Check<V> take_angle() {
+    if (!(design.wrap.period > 0) || !design.is_controller || design.error_based ||
+        design.compensates) {
+      return {};
+    }
+    const bool elsewhere = RecordAccess::blanks<Core> || RecordAccess::knows<Observer> ||
+                           design.options.moving_reference;
+    if (elsewhere ? design.softens : !detail::take_angle(design)) {
+      return Error<V>{"soften", V(1), "of an angle is not written for this observer"};
+    }
+    return {};
+  }
+
+  [[nodiscard]] Check<V> take_gains(const Core& observer) {
+    design.size = size;
+    design.max_gap = observer.max_gap();
+    design.order = Observer::order;
+    design.sample_time = static_cast<double>(observer.sample_time());
+    design.input_gain = static_cast<double>(observer.input_gain());
+    if constexpr (RecordAccess::kind_of<
+                      std::remove_cvref_t<decltype(RecordAccess::laws(observer)[0])>> ==
+                  RunningLaw::none) {
+      return take_table(observer);
+    }
+    return {};
+  }
+
+  [[nodiscard]] Check<V> take_table(const Core& observer) {
+    const auto& laws = RecordAccess::laws(observer);
+    constexpr auto most = static_cast<unsigned>(most_bridged);
+    design.recovers = observer.longest_gap() > observer.max_gap() ||
+                      (design.options.settings_in_struct && recovery_after(laws, most) >= 0 &&
+                       recovery_after(laws, most) < GapRecovery<double>::never);
+    for (int elapsed = 1; elapsed <= observer.longest_gap() + 1; ++elapsed) {
+      std::vector<double> row;
+      for (const auto& law : RecordAccess::laws(observer)) {
+        const auto gap = static_cast<unsigned>(elapsed);
+        const auto gain =
+            elapsed == 1 ? ScaledGain<size, V>(law.gain(V(0))) : law.gap_gain(V(0), gap);
+        const auto other = elapsed == 1 ? gain : law.gap_gain(V(1), gap);
+        for (std::size_t i = 0; i < gain.size(); ++i) {
+          row.push_back(static_cast<double>(gain[i]));
+          const bool same = !(gain[i] < other[i]) && !(gain[i] > other[i]);
+          if (!same) {
+            return Error<V>{"gap_gain", other[i],
+                            "depends on the innovation: no table can hold it"};
+          }
+        }
+      }
+      design.gap_gains.push_back(row);
+      const int due = elapsed == 1 ? -1 : recovery_after(laws, static_cast<unsigned>(elapsed));
+      design.recovery.push_back(due < GapRecovery<double>::never
+                                    ? static_cast<std::uint16_t>(due + 1)
+                                    : std::uint16_t{0});
+    }
+    return {};
+  }
+
+  Subject subject_;
+  Recorder<Subject> recorder_;
+};
+
+/// Samples for the self-test: what y is does not matter. @param step gives the result for y and the
+/// `inputs` beside it, (u) or (r, ..)
+template <class V, int inputs = 1, class Step>
+std::vector<std::vector<double>> self_test_samples(int count, Step&& step) {
+  std::vector<std::vector<double>> samples;
+  for (int k = 0; k < count; ++k) {
+    const V y = static_cast<V>(0.25 * ((k * 37) % 16) - 1.5);
+    Vector<V, inputs> beside;
+    for (int i = 0; i < inputs; ++i) {
+      beside(i) = static_cast<V>(i == 0 ? ((k / 10) % 2 == 0 ? 1.0 : -0.5)
+                                        : 0.125 * ((k * 11 + i) % 9) - 0.5);
+    }
+    std::vector<double> sample{static_cast<double>(y)};
+    for (const V& one : beside) sample.push_back(static_cast<double>(one));
+    sample.push_back(static_cast<double>(step(y, beside)));
+    samples.push_back(std::move(sample));
+  }
+  return samples;
+}
+
+/// The self-test of a controller.
+template <class C>
+void take_samples(RecordedDesign& design, C played) {
+  using V = typename C::scalar_type;
+  const int count = design.options.self_test_samples;
+  if constexpr (requires { typename C::Reference; }) {
+    if (design.options.moving_reference) {
+      design.samples = self_test_samples<V, C::order + 1>(
+          count, [&](V y, const auto& motion) { return played.update(y, motion); });
+      return;
+    }
+  }
+  design.samples =
+      self_test_samples<V>(count, [&](V y, const auto& r) { return played.update(y, r(0)); });
+}
+
+/// Records the calls of a controller without its adapters, of which the design knows already.
+template <class Bare, class BareObserver>
+[[nodiscard]] Check<typename Bare::scalar_type> record_controller(
+    DesignRecorder<Bare, BareObserver>& maker) {
+  using Access = RecordAccess;
+  using Number = typename DesignRecorder<Bare, BareObserver>::Number;
+  using Numbers = typename DesignRecorder<Bare, BareObserver>::Numbers;
+  RecordedDesign& design = maker.design;
+  const bool wraps = design.wrap.period > 0;
+  const bool around_angle = design.known.around_angle;
+  maker.add_bound("rest_at", wraps ? "y u angle" : "y u", false,
+                  [around_angle](auto& c, const Numbers& in) {
+                    Access::rest(Access::at_rest(c.observer()), in, around_angle);
+                    return Numbers{};
+                  });
+  const bool blanks = Access::blanks<BareObserver>;
+  const std::string law = blanks ? "law_for" : "law";
+  const std::string estimates = blanks ? " " + numbered("e", BareObserver::size, 0) : "";
+  if (!design.options.moving_reference) {
+    maker.add(law, "r" + estimates, true,
+              [](auto& c, const Numbers& in) { return Numbers{Access::law_for(c, in[0], in, 1)}; });
+  } else if constexpr (requires { typename Bare::Reference; }) {
+    maker.add(law, "r " + numbered("r", Bare::order) + estimates, true,
+              [](auto& c, const Numbers& in) {
+                typename std::remove_cvref_t<decltype(c)>::Reference::All motion;
+                for (int i = 0; i <= Bare::order; ++i) motion(i) = in[static_cast<std::size_t>(i)];
+                return Numbers{Access::law_for(c, motion, in, Bare::order + 1)};
+              });
+  }
+  maker.add("limit", "u", true, [](auto& c, const Numbers& in) {
+    return Numbers{Access::limited(Access::loop(c), in[0])};
+  });
+  maker.add("take_over", "u", false, [](auto& c, const Numbers& in) {
+    Access::limiter_of(c).track(in[0]);
+    return Numbers{};
+  });
+  maker.add("within", "u", true, [](auto& c, const Numbers& in) {
+    return Numbers{Access::limiter_of(c).within(in[0])};
+  });
+  if (design.softens) {
+    maker.add("harden", "", false, [](auto& c, const Numbers&) {
+      Access::harden(c);
+      return Numbers{};
+    });
+  }
+  const auto name_of = [](const auto& c, const Number* at) -> std::string {
+    // The limiter keeps the bounds of the next output behind the last.
+    const Number* behind = &c.limiter().last();
+    for (const char* name : {"u_last", "u_low", "u_high", "u_command"}) {
+      if (at == behind++) return name;
+    }
+    return at == &c.requested() ? "u_asked" : at == &c.limiter().waiting() ? "u_waiting" : "";
+  };
+  return maker.record(OfController{}, name_of);
+}
+
+template <Scalar S>
+void take_rate(RecordedDesign& design, const Limiter<S>& limiter) {
+  if (is_finite(limiter.step())) design.rate = static_cast<double>(limiter.step());
+  design.waits = limiter.waits();
+}
+
+/// The design of a controller.
+template <WritableController C>
+Expected<RecordedDesign, Error<typename C::scalar_type>> recorded_design(
+    const C& controller, const CodeOptions& options) {
+  using V = typename C::scalar_type;
+  using Access = RecordAccess;
+  using Of = ObserverOfController<C>;
+  using Bare = typename WithoutAdapter<C>::type;
+  using Maker = DesignRecorder<Bare, typename WithoutAdapter<typename Of::type>::type>;
+
+  constexpr bool takes_motion = !Of::error_based && requires { controller.gains(); };
+  if (const auto rules = checked_options<V>(options, takes_motion); !rules) return rules.error();
+  const Bare bare = without_adapter(controller);
+  Maker maker(bare, options);
+  RecordedDesign& design = maker.design;
+  design.is_controller = true;
+  design.loop = Access::rules(Access::loop(bare));
+  design.error_based = Of::error_based;
+  design.softens = Access::softens(bare);
+  design.compensates = !requires { controller.gains(); };
+  design.lower = static_cast<double>(controller.limiter().lower());
+  design.upper = static_cast<double>(controller.limiter().upper());
+  take_rate(design, controller.limiter());
+  take_adapters(design, controller.observer());
+  design.law = Access::law_numbers(Access::core(bare.observer()));
+  if (design.softens && !design.map.lines.empty()) {
+    return Error<V>{"soften", V(1), "is not written for a controller around MappedInput"};
+  }
+
+  if constexpr (requires { controller.gains(); }) {
+    for (const V& k : controller.gains()) design.law_gains.push_back(static_cast<double>(k));
+  }
+
+  if (auto ok = record_controller(maker); !ok) return ok.error();
+  if (design.error_based) design.input_gain = -design.input_gain;
+  take_samples(design, controller);
+  return design;
+}
+
+/// The design of an observer.
+template <WritableObserver Observer>
+Expected<RecordedDesign, Error<typename Observer::scalar_type>> recorded_design(
+    const Observer& observer, const CodeOptions& options) {
+  using V = typename Observer::scalar_type;
+  using Bare = typename WithoutAdapter<Observer>::type;
+  using Maker = DesignRecorder<Bare, Bare>;
+
+  if (const auto rules = checked_options<V>(options, false); !rules) return rules.error();
+  const Bare bare = without_adapter(observer);
+  Maker maker(bare, options);
+  take_adapters(maker.design, observer);
+  maker.design.law = RecordAccess::law_numbers(RecordAccess::core(bare));
+  if (auto ok = maker.record(Itself{}, NoName{}); !ok) return ok.error();
+  Observer played = observer;
+  maker.design.samples = self_test_samples<V>(options.self_test_samples, [&](V y, const auto& u) {
+    (void)played.update(y, u(0));
+    return played.total_disturbance();
+  });
+  return maker.design;
+}
+
+/// The design of a controller in two phases.
+template <WritablePredictive C>
+Expected<RecordedDesign, Error<typename C::scalar_type>> recorded_design(
+    const C& controller, const CodeOptions& options) {
+  using V = typename C::scalar_type;
+  using Observer = typename PredictiveOf<C>::type;
+  using Maker = DesignRecorder<C, Observer>;
+  using Number = typename Maker::Number;
+  using Numbers = typename Maker::Numbers;
+
+  Rules<V> rules = checked_options<V>(options);
+  rules
+      .demand(!options.settings_in_struct, "settings_in_struct", V(1),
+              "is not written for PredictiveAdrc")
+      .demand(!options.saves_state, "saves_state", V(1), "is not written for PredictiveAdrc");
+  if (!rules) return rules.error();
+  Maker maker(controller, options);
+  RecordedDesign& design = maker.design;
+  design.predictive = true;
+  design.law = RecordAccess::law_numbers(controller.observer());
+  design.hold = RecordAccess::hold_left(controller);
+  design.loop = RecordAccess::rules_of_phases(controller);
+  design.lower = static_cast<double>(RecordAccess::limiter(controller).lower());
+  design.upper = static_cast<double>(RecordAccess::limiter(controller).upper());
+  take_rate(design, RecordAccess::limiter(controller));
+  maker.add("rest_at", "y u", false, [](auto& c, const Numbers& in) {
+    RecordAccess::rest(RecordAccess::at_rest(OfPredictive{}(c)), in, false);
+    return Numbers{};
+  });
+  RecordAccess::add_phases<Number, Observer>(
+      design.waits, options.moving_reference,
+      [&]<class Call>(std::string_view name, std::string_view arguments, bool has_output,
+                      const Call&) {
+        maker.add(name, arguments, has_output,
+                  [](auto& c, const Numbers& in) { return Call{}(c, in); });
+      });
+  const auto name_of = [](const auto& c, const Number* at) -> std::string {
+    return at == &c.output() ? "u_last" : "";
+  };
+  if (auto ok = maker.record(OfPredictive{}, name_of); !ok) return ok.error();
+  take_samples(design, controller);
+  return design;
+}
+
+}  // namespace detail
+}  // namespace esokit
+
+#if defined(ESOKIT_HEADER_ONLY)
+#include <esokit/target/impl/recorded_design.ipp>
+#endif

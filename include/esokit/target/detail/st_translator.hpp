@@ -1,0 +1,71 @@
+/// @file
+/// The C that esokit writes, function by function as Structured Text.
+#pragma once
+
+#include <esokit/core/detail/compiled.hpp>
+#include <esokit/target/detail/list_writer.hpp>
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+namespace esokit::detail {
+
+class StParser;
+
+/// Translates C, in the narrow subset that to_c writes, into functions of Structured Text (IEC
+/// 61131-3, second edition: no methods, no pointers). The subset: declaration, assignment, if,
+/// else, for, while, return, call. A pointer becomes VAR_IN_OUT, a count of any width UDINT, a
+/// table a part of the state. Structured Text evaluates both sides of a condition and of a choice:
+/// what C evaluates only behind another one neither changes anything nor is a place or a difference
+/// of counts. What is no part of the subset ends it: see `error`.
+class StTranslator {
+ public:
+  /// What could not be translated; empty: nothing.
+  std::string error{};
+
+  /// @param text header and source, one after the other @param name before each function and type
+  StTranslator(const std::string& text, const std::string& name);
+
+  [[nodiscard]] bool has(const std::string& name) const { return functions_.count(name) != 0; }
+
+  /// Whatever `body` calls is written, with all that these call.
+  void write_for(const std::string& body);
+  /// The types, then the functions that are needed.
+  [[nodiscard]] std::string text() const;
+  /// A function that gives the settings of the C to a variable. @param as behind its name
+  [[nodiscard]] std::string settings(const std::string& as) const;
+
+  /// A number of C.
+  [[nodiscard]] static std::string number(std::string text);
+
+ private:
+  friend class StParser;
+  struct Variable {
+    std::string name{}, type{};
+    std::vector<int> sizes{};  ///< of an array
+    bool by_reference = false;
+    bool is_constant = false;
+    std::string initial{}, comment{};
+  };
+  struct Function {
+    std::string type{}, text{};
+    std::vector<Variable> parameters{};
+    std::set<std::string> calls{};
+  };
+
+  void need(const std::string& function);
+
+  std::string name_;
+  std::string types_{};
+  std::string settings_{};  ///< the statements that give them
+  std::map<std::string, Function> functions_{};
+  std::vector<std::string> order_{};  ///< of their text
+  std::set<std::string> needed_{};
+};
+
+}  // namespace esokit::detail
+
+#if defined(ESOKIT_HEADER_ONLY)
+#include <esokit/target/impl/st_translator.ipp>
+#endif
