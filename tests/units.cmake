@@ -22,7 +22,7 @@ set(esokit_units
     "math/combinatorics math/fal math/positivity"
     "model/augmented_model model/linear_plant model/plant_model"
     "observer/absurd_numbers observer/adjustable_bandwidth_eso observer/given_values observer/reconvergence"
-    "observer/algebraic_eso observer/cascade_identities observer/observer_static observer/predictor_corrector observer/random_config observer/refused_config"
+    "observer/algebraic_eso observer/cascade_identities observer/observer_static observer/predictor_corrector observer/random_config observer/refused_config observer/update_on_paper"
     "observer/archetype_scalars observer/concepts_static observer/model_seam"
     "observer/named_observer observer/nonlinear_eso observer/pack"
     "observer/adjustable_bandwidth_eso_laws observer/cascade_eso_laws observer/half_gain_eso_laws observer/linear_eso_laws observer/own_observer_laws observer/pole_set_laws"

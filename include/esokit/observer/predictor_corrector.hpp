@@ -15,6 +15,25 @@
 
 namespace esokit {
 
+/// One sample of an observer, as it stands on paper:
+///
+///     z(k|k-1) = Phi z(k-1) + Gamma u(k-1)             predict
+///     z(k)     = z(k|k-1) + k (y(k) - z_1(k|k-1))      correct
+///
+/// The model gives Phi and Gamma, the gain law gives k. `PredictorCorrector` computes the same in
+/// scaled states, which need no products with zeros and ones. It adds levels, missing samples and
+/// bad numbers. Tests compare its observers with this one; nothing else calls it.
+/// @param phi N x N, exact for a u that is held @param gamma N x 1 @param k N x 1
+/// @param z estimate of the sample before, N x 1, physical units like all here
+/// @param u what the actuator held since then @param y measurement of now
+/// @tparam Matrix, Vector any with `*`, `+` and `(row)`, such as those of Eigen
+template <class Matrix, class Vector, class S>
+[[nodiscard]] constexpr Vector update_on_paper(const Matrix& phi, const Vector& gamma,
+                                               const Vector& k, const Vector& z, S u, S y) {
+  const Vector predicted = phi * z + gamma * u;
+  return predicted + k * (y - predicted(0));
+}
+
 /// The settings that all sampled observers have in common.
 template <Scalar S>
 struct ChainConfig {
