@@ -70,7 +70,7 @@ const std::vector<Case> cases{
     {.name = "load, encoder", .load = 0.3, .coarse = true},
     {.name = "load, later by half", .load = 0.3, .later = 0.5},
     {.name = "load, 30 % late", .load = 0.3, .stale = 0.3},
-    {.name = "load, lag not told", .load = 0.3, .wrong = Wrong::no_lag},
+    {.name = "load, lag unknown", .load = 0.3, .wrong = Wrong::no_lag},
     {.name = "load, order wrong", .load = 0.3, .wrong = Wrong::order}};
 constexpr std::size_t load_step = 2;
 

@@ -266,7 +266,7 @@ function draw_log() {
   if (log_result && !$('log').hidden) for (const figure of log_result.drawn) figure.draw();
 }
 
-// ---- the C of what is played with: from the module of the logs, which is there when it is asked for ----
+// ---- the C of what is set: from the module of the logs, which is there when it is asked for ----
 
 async function c_of_state() {
   const none = new Proxy({}, { get: () => () => 8 });

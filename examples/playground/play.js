@@ -277,7 +277,7 @@ const rows = [
     '× ' + shown(n.gain_decrease) : n.gain_decrease === 0 ? 'no limit' : '–'],
   ['phase margin', (n) => Number.isFinite(n.phase) ? shown(180 / Math.PI * n.phase) + '°' : shown(n.phase)],
   ['least abs(1 + L)', (n) => shown(n.modulus)],
-  ['more delay until it swings', (n) => seconds(n.delay)],
+  ['more delay until it oscillates', (n) => seconds(n.delay)],
   ['crossover', (n) => shown(n.crossover), 'rad/s'],
   ['noise in u, standard deviation', (n) => shown(n.noise), 'u'],
   ['overshoot', (n) => shown(100 * n.overshoot) + ' %'],
@@ -525,7 +525,7 @@ const svg = () => stacked(Object.values(plots).map((plot) => [plot.svg, plot.see
 
 // ---- the test of examples/playground/check.sh: every number of some settings ----
 
-// What a visitor does: each control has a name, each button tells a sentence and can be taken back, a
+// What a visitor does: each control has a name, each button says a sentence and can be taken back. A
 // slider and a field change the figures, what is refused is said, and the page lives on.
 function visit() {
   const problems = [];

@@ -129,10 +129,10 @@ int main(int argc, char** argv) {
   trial("window 2 s, loop 2 s", {.loop = 2, .window = 2});
   const Trace good = trial("window 10 s, loop 10 s", {});
   trial("window 10 s, least 4 s", {.least = 4});
-  trial("window 10 s, least 4 s, not told", {.least = 4, .says = false});
+  trial("window 10 s, least 4 s, not reported", {.least = 4, .says = false});
   const Trace long_one = trial("window 60 s, loop 60 s", {.loop = 60, .window = 60});
   const Trace bad = trial("window 60 s, loop 1 s", {.loop = 1, .window = 60});
-  trial("window 60 s, loop 1 s, not told", {.loop = 1, .window = 60, .says = false});
+  trial("window 60 s, loop 1 s, not reported", {.loop = 1, .window = 60, .says = false});
   const auto rms = [](const Trace& trace) { return trace.rms(1000, 1600); };
   report.expect("window 10 s, loop 10 s", "error over that of 60 s, loop 1 s", rms(good) / rms(bad),
                 rms(good) < 0.1 * rms(bad), "below a tenth");

@@ -1000,7 +1000,7 @@ TEST(Judge, RefusesByName) {
       {&bad.excitation, 0.151,
        "excitation: is the smallest relative error of b0 and too large: what of y follows from u "
        "is "
-       "not told from the rest; record several steps that last until y settles, or a sweep"},
+       "not distinct from the rest; record several steps that last until y settles, or a sweep"},
       {&bad.correlation, 0.101,
        "correlation: is the correlation of the innovations, so the model lacks something, and "
        "output error does not tell b0 either: record longer, with steps of u that last until y "

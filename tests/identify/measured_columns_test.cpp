@@ -144,8 +144,8 @@ TEST(MeasuredColumns, WhatCannotBeTold) {
   EXPECT_EQ(bent->columns[0].latency.value, 0);
   // A constant, a copy of u, and a copy of another column are refused by name; a copy of u with so
   // much of its own is not.
-  const std::string none = "never changes, so nothing can be told of it";
-  const std::string apart = "so the two cannot be told apart";
+  const std::string none = "never changes, so it shows nothing";
+  const std::string apart = "so the two cannot be distinguished";
   log.columns = {both, std::vector<double>(log.y.size(), 3.0)};
   EXPECT_TRUE(refusal(log).find("columns[1] = 3: ") != std::string::npos) << refusal(log);
   EXPECT_NE(refusal(log).find(none), std::string::npos) << refusal(log);

@@ -441,7 +441,7 @@ Figure tradeoff_figure(const esokit::Tuning& tuning, std::size_t taken) {
 Figure lost_figure(const esokit::Tuning& tuning, const esokit::TunedDesign& design) {
   Figure figure("overload", {.rows = 2, .columns = 1, .panel_height = 150});
   figure.caption("This is why designs rank behind: " + design.name + " does not recover from " +
-                 design.lost + ". Played with limits and noise.");
+                 design.lost + ". Simulated with limits and noise.");
   const auto variants = esokit::simulated_variants(tuning.model);
   const auto& variant = variants[static_cast<std::size_t>(design.lost_on)];
   std::vector<double> t, y, u;

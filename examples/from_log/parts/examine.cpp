@@ -197,7 +197,7 @@ void say_moves(const Input& input, Findings& all) {
     std::string text = "u (" + input.u + ", " + range + ") moves by a fifth of its range ";
     text += at.size() == 1 ? "once only, " : "only " + std::to_string(at.size()) + " times, first ";
     all.shown.push_back(text + "at " + duration_text(at[0]) +
-                        ": what follows from u cannot be told from a drift that begins at about "
+                        ": what follows from u looks like a drift that begins at about "
                         "that time.");
     return;
   }

@@ -48,12 +48,13 @@ struct Settings {
   std::optional<double> expected_gain;  ///< b0 as the user believes it to be
   std::optional<std::pair<double, double>> limits;
   std::optional<double> friction;  ///< as in TuneModel; none: not known
-  double noise_share = 0;  ///< wish: deviation of u by noise, share of its range; 0: as tune has it
-  double settling_time = 0;  ///< wish instead: s
-  double controller = 0;     ///< wish instead: omega_c, rad/s
+  double noise_share =
+      0;  ///< specification: deviation of u by noise, share of its range; 0: as tune has it
+  double settling_time = 0;  ///< instead: s
+  double controller = 0;     ///< instead: omega_c, rad/s
   /// The PID that the machine has: what changes by going to the design?
   std::optional<esokit::PlainPidConfig> pid{};
-  /// What the loop has to keep; the page says of every design whether it comes back.
+  /// What the loop has to keep; the page says of every design whether it recovers.
   esokit::TuneRules rules{.simulate = esokit::TuneSimulation::all};
   int rank = 1;            ///< which of the designs, the best is 1
   bool anyway = false;     ///< design for a refused log, too

@@ -631,7 +631,7 @@ double Runner::update(double y, double target, const std::vector<double>& w) {
   std::vector<double> next = state_;
   for (int i = 0; i < n; ++i) {
     double& sum = next[static_cast<std::size_t>(i)];
-    // The observer is told of u without what is known.
+    // The observer is given u without what is known.
     sum += form_.from_y(i, 0) * from_rest + form_.from_u(i, 0) * (u - known - u_);
     for (int j = 0; j < n; ++j) sum += form_.a(i, j) * state_[static_cast<std::size_t>(j)];
   }

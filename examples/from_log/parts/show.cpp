@@ -89,8 +89,8 @@ std::string in_words(const std::string& field, const esokit::Identified& found) 
        "The log is too short. Record at least 200 rows without a gap; 20 s at the sample rate of "
        "the controller are better."}};
   if (field == "latency" && found.latency.value * std::abs(found.pole.value) > 0.8) {
-    return "y settles as fast as it begins to react, so lag, dead time and pole cannot be told "
-           "apart. Log more rows per second, and y before its filters.";
+    return "y settles as fast as it begins to react, so lag, dead time and pole cannot be "
+           "distinguished. Log more rows per second, and y before its filters.";
   }
   if (field == "rise" && found.late_rows > 0) {
     return "y rises or falls faster than u can move it by this b0: something else moves y. Log "
@@ -254,7 +254,7 @@ std::vector<CsvRow> model_table(const Input& input, const Findings& findings) {
         {name, with_interval(effect.gain), "[" + highest + "] / its unit",
          "what one unit of it adds to " + highest + (effect.told() ? "" : "; it may be nothing")});
     if (!effect.timed) {
-      rows.push_back({name + ": lag, dead time", "not told", "",
+      rows.push_back({name + ": lag, dead time", "not found", "",
                       effect.follows_output ? "it is a function of y, and acts at once"
                                             : "it does too little"});
       continue;

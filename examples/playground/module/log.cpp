@@ -70,7 +70,7 @@ void take_over(const from_log::Outcome& outcome, LogResult& result) {
   if (choice >= 4) {
     for (std::size_t i = 0; i < poles.size(); ++i) {
       exactly("pole", i + 1, poles[i].real() / fast);
-      exactly("swing", i + 1, poles[i].imag() / fast);
+      exactly("oscillation", i + 1, poles[i].imag() / fast);
     }
     const auto count = static_cast<double>(gains.size());
     for (std::size_t i = 0; i < gains.size(); ++i)

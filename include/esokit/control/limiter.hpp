@@ -131,10 +131,10 @@ class Limiter {
     }
   }
 
-  /// The same for a caller that says in `applied` what was said before. @param told `applied` was
-  /// said since the last output
-  [[nodiscard]] constexpr const S& commanded(bool told) const noexcept {
-    return told ? commanded_ : held_;
+  /// The same for a caller that says in `applied` what was said before.
+  /// @param reported `applied` was said since the last output
+  [[nodiscard]] constexpr const S& commanded(bool reported) const noexcept {
+    return reported ? commanded_ : held_;
   }
 
   /// Takes over the limits of `fresh`; what is held is kept. @param command the last output, as

@@ -136,8 +136,9 @@ struct Identified {
   bool position = false;
   PositionForce position_force{};  ///< what was fitted
 
-  /// Change of b0 if they are added (if they are in the model: the next three powers), half widths
-  /// of b0 (at least 1 % of b0), with its drift over one and a half octaves.
+  /// Change of b0 if these columns are added, in half widths of b0 (of at least 1 % of b0), with
+  /// the drift of b0 over one and a half octaves. If they are in the model, the next three powers
+  /// are added.
   double position_shift = 0;
   double correlation = 0;          ///< largest correlation of the innovations over lags 1 to 20
   SecondOpinion second_opinion{};  ///< b0 by output error

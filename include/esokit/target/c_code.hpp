@@ -33,31 +33,34 @@ CCode c_code(const RecordedDesign& design);
 
 }  // namespace detail
 
-/// The controller or observer as C99, two files without a library: state struct, init, update,
-/// estimates in physical units, and a self-test that compares with the C++ (compiled if
-/// `NAME_SELF_TEST` is defined); of a controller also start, of an observer reset, predict and
-/// correct. What is done at a sample is recorded from its own calls, so there is no second
-/// implementation; settings are constants, or, with `settings_in_struct`, gains and limits in a
-/// struct that `name_adopt` changes while it runs, as `adopt` does. Bad and missing samples, gaps,
-/// restarts, the start hold and safe mode are those of the object, too.
+/// The controller or observer as C99, two files without a library.
+///
+/// They have a state struct, init, update, estimates in physical units, and a self-test that
+/// compares with the C++ (compiled if `NAME_SELF_TEST` is defined). A controller also has start, an
+/// observer reset, predict and correct. What is done at a sample is recorded from its own calls, so
+/// there is no second implementation. Settings are constants. With `settings_in_struct`, gains and
+/// limits are a struct that `name_adopt` changes while it runs, as `adopt` does. Bad and missing
+/// samples, gaps, restarts, the start hold and safe mode are those of the object, too.
 ///
 /// Compiled without contraction (-std=c99 in GCC) it equals the C++ bit for bit, as far as tested:
 /// after any bad sample, gap, report or start. Where the design computes a power or an exponential
 /// at each sample (NonlinearEso), nothing is promised through those of another library. A gap of
 /// each length has its gains in a table of one row more than the `max_gap` of the config: choose it
-/// as short as the machine allows. Where gaps beyond `max_gap()` are bridged, `update` of a good
+/// as short as the machine allows. Where gaps beyond `max_gap()` are bridged, `update` of a valid
 /// sample also reads whether corrections are due.
 ///
-/// Written are LinearEso, also with a set of poles, HalfGainEso, ReducedOrderEso, CascadeEso,
-/// AdjustableBandwidthEso, NonlinearEso, ModelEso, PlantEso and their cascades (not with
-/// `follows_speed`), AlgebraicEso, ExtendedStateFilter (in its modes recursive and frozen, without
-/// a nominal model), these in DelayedInput, OutlierGate and WrappedOutput, in KnownModel if its
-/// function is generic (not AlgebraicEso), in MappedInput (where the law does not soften; the curve
-/// is no setting), in Measured (not around WrappedOutput or another Measured, and not in Guarded),
-/// LinearEso and CascadeEso in Guarded, too (a changing b0 unless the law softens), Adrc of both
-/// forms and DisturbanceCompensator around them, and PredictiveAdrc around one without an adapter
-/// whose gain is known before the measurement (not AdjustableBandwidthEso or NonlinearEso), so
-/// EPADRC around ExtendedStateFilter, too. Others do not compile.
+/// Written are, and others do not compile:
+/// - LinearEso, also with a set of poles, HalfGainEso, ReducedOrderEso, CascadeEso, PlantEso,
+///   AdjustableBandwidthEso, NonlinearEso, AlgebraicEso; ModelEso, not with `follows_speed`;
+///   ExtendedStateFilter, recursive and frozen, without a nominal model;
+/// - these in DelayedInput, OutlierGate and WrappedOutput;
+/// - these but AlgebraicEso in KnownModel, if its function is generic;
+/// - these in MappedInput, where the law does not soften (the curve is no setting);
+/// - these in Measured, not around WrappedOutput or another Measured, and not in Guarded;
+/// - LinearEso and CascadeEso in Guarded (a changing b0 unless the law softens);
+/// - Adrc of both forms and DisturbanceCompensator around all of these;
+/// - PredictiveAdrc around one without an adapter whose gain is known before the measurement (not
+///   AdjustableBandwidthEso or NonlinearEso), so EPADRC around ExtendedStateFilter, too.
 ///
 /// The function of a KnownModel is recorded like all else, with its own numbers as constants: it is
 /// `template <class E> auto operator()(const E& x) const noexcept`, or a template of the scalar
@@ -67,10 +70,9 @@ CCode c_code(const RecordedDesign& design);
 ///
 /// SmoothProfile, TimeProportioned and HealthMonitor: target/profile_code.hpp,
 /// target/time_proportioned_code.hpp and target/health_code.hpp.
-/// @param object as `make` returned it, or running, after a good sample: `init` begins in its
-/// state,
-///        a `start` or report since included. A gap that runs, safe mode and a sample without a
-///        measurement that is due are not kept
+/// @param object as `make` returned it, or running, after a valid sample: `init` begins in its
+///        state, a `start` or report since included. A gap that runs, safe mode and a sample
+///        without a measurement that is due are not kept
 /// @return error for a name that is no identifier, a comment that would end the one it stands in, a
 ///         number of samples of the self-test out of range, or a gain law of your own whose gain
 ///         after a gap depends on the innovation

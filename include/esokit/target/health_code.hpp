@@ -106,7 +106,7 @@ requires std::same_as<S, typename Controller::scalar_type> Expected<CCode, Error
   limit("NEGATIVE", 0);
   limit("ONCE", 1);
   limit("A_QUARTER", 4);
-  limit("SWINGS", 0.05);
+  limit("OFTEN_LIMITED", 0.05);
   limit("ONE_SIDE", 0.8);
   text.count("SIZE", Size);
   text.count("DIVIDER", static_cast<std::size_t>(settings.divider));

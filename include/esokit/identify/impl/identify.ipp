@@ -521,8 +521,8 @@ inline bool worth_earlier(const Folded& found, const FitData& raw, const FitData
 }
 
 /// Whether u was logged late. That must make the log far more likely, and output error must find
-/// the same b0, of the same sign as before: where u follows from y of its own row, u that is taken
-/// earlier tells the noise of y.
+/// the same b0, of the same sign as before. For where u follows from y of its own row, an earlier u
+/// predicts the noise of y.
 inline bool far_more_likely(const Folded& earlier, const Folded& as_logged) {
   const Identified& found = earlier.best;
   const SecondOpinion& second = found.second_opinion;
@@ -631,7 +631,7 @@ ESOKIT_FUNCTION Check<double> judge(const Identified& found, const Log& log,
   const bool excited = found.plateau.middle > 0 && found.excitation < detail::excitation_max;
   rules.demand(excited, "excitation", found.plateau.middle > 0 ? found.excitation : 1.0,
                "is the smallest relative error of b0 and too large: what of y follows from u is "
-               "not told from the rest; record several steps that last until y settles, or a "
+               "not distinct from the rest; record several steps that last until y settles, or a "
                "sweep");
   // Behind it: of a log that moves next to nothing this is no finding.
   rules.demand(

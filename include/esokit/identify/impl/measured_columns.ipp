@@ -69,16 +69,16 @@ ESOKIT_FUNCTION Check<double> tells_itself(const FitData& data, std::size_t c) {
   };
   const auto [low, high] = std::minmax_element(column.begin(), column.end());
   Rules<double> rules;
-  rules.demand(*high > *low, at(*low, "never changes, so nothing can be told of it: leave it out"));
+  rules.demand(*high > *low, at(*low, "never changes, so it shows nothing: leave it out"));
   rules.demand(share_beside(column, data.u) > follows,
                at(share_beside(column, data.u),
-                  "is the share of its squares that does not follow u, so the two cannot be told "
-                  "apart: move it by itself, or leave it out; must be above",
+                  "is the share of its squares that does not follow u, so the two cannot be "
+                  "distinguished: move it by itself, or leave it out; must be above",
                   follows, true));
   for (std::size_t other = 0; other < c; ++other) {
     rules.demand(share_beside(column, data.columns[other]) > 1e-3 * follows,
                  at(static_cast<double>(other),
-                    "is the column that it follows, so the two cannot be told apart: leave one "
+                    "is the column that it follows, so the two cannot be distinguished: leave one "
                     "out"));
   }
   return rules;

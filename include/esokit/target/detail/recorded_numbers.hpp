@@ -24,8 +24,8 @@ struct CodeOptions {
   bool watched = false;  ///< keeps what a HealthMonitor looks at: innovation, and u that was asked
 
   /// `update` takes r, r', .., r^(n) instead of r alone, for a reference that moves, such as what
-  /// `name_motion` of a SmoothProfile gives; of a law that takes them: Adrc, not of the error-based
-  /// form, and PredictiveAdrc. Not in fixed point.
+  /// `name_motion` of a SmoothProfile gives. Of Adrc (not the error-based form) and PredictiveAdrc,
+  /// not in fixed point.
   bool moving_reference = false;
 
   /// `name_save` and `name_load` for a state that is kept over a restart, with a CRC and the hash

@@ -373,10 +373,10 @@ class CDesign {
     };
     add("taken.", wrap.count);
     if (!wrap.gated) return;
-    add("heard.", wrap.heard);
-    count("heard_at", wrap.heard_at);
-    count("heard_steady", wrap.heard_steady);
-    count("heard_rejected", wrap.heard_rejected);
+    add("seen.", wrap.heard);
+    count("seen_at", wrap.heard_at);
+    count("seen_steady", wrap.heard_steady);
+    count("seen_rejected", wrap.heard_rejected);
   }
 
   void set_found() {

@@ -24,7 +24,7 @@ $COMMENT   FUNCTION_BLOCK $name is at the end: call it once in each T = $TIME s;
 
 )";
 
-/// What is told before a sample.
+/// What is given before a sample.
 inline constexpr const char* st_tell_measured = R"(IF NOT no_w THEN
   done := $name_measured(o := o, w := w);
 END_IF;

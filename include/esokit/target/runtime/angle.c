@@ -13,7 +13,7 @@ typedef struct {
   bool counted;
 #if ESOKIT_GATED_ANGLE
   uint32_t missed; /* samples since one was taken */
-  bool heard; /* its turn is counted from rejected ones, too */
+  bool seen; /* its turn is counted from rejected ones, too */
 #endif
 } angle_reading;
 
@@ -43,10 +43,10 @@ static void forget_turns(esokit_state *o)
 {
   forget_count(&o->taken);
 #if ESOKIT_GATED_ANGLE
-  forget_count(&o->heard);
-  o->heard_at = 0u;
-  o->heard_steady = 0u;
-  o->heard_rejected = 0u;
+  forget_count(&o->seen);
+  o->seen_at = 0u;
+  o->seen_steady = 0u;
+  o->seen_rejected = 0u;
 #endif
 }
 
@@ -95,7 +95,7 @@ static angle_reading read_angle(const esokit_turns *o, real y, uint32_t samples)
   reading.counted = false;
 #if ESOKIT_GATED_ANGLE
   reading.missed = 0u;
-  reading.heard = false;
+  reading.seen = false;
 #endif
   if (can_be_told(y)) {
     reading.usable = true;
@@ -130,7 +130,7 @@ static void recentre(esokit_state *o)
     if (shift(o, -(turns * PERIOD))) {
       o->taken.turns = o->taken.turns - turns;
 #if ESOKIT_GATED_ANGLE
-      o->heard.turns = o->heard.turns - turns;
+      o->seen.turns = o->seen.turns - turns;
 #endif
     }
   }
@@ -179,13 +179,13 @@ static angle_reading choose_angle(const esokit_state *o, real y, uint32_t missed
   angle_reading reading = read_angle(&o->taken, y, missed);
 #if ESOKIT_GATED_ANGLE
   reading.missed = missed;
-  if ((o->heard_rejected > 0u) && (o->heard_steady >= 8u) &&
-      (o->heard_steady >= o->heard_rejected)) {
-    angle_reading heard = read_angle(&o->heard, y, missed - o->heard_at);
-    if (heard.fits && heard.counted) {
-      heard.missed = missed;
-      heard.heard = true;
-      reading = heard;
+  if ((o->seen_rejected > 0u) && (o->seen_steady >= 8u) &&
+      (o->seen_steady >= o->seen_rejected)) {
+    angle_reading seen = read_angle(&o->seen, y, missed - o->seen_at);
+    if (seen.fits && seen.counted) {
+      seen.missed = missed;
+      seen.seen = true;
+      reading = seen;
     }
   }
 #endif
@@ -200,12 +200,12 @@ static uint8_t one_more(uint8_t count)
 
 static void hear_angle(esokit_state *o, const angle_reading *given)
 {
-  const angle_reading reading = read_angle(&o->heard, given->y, given->missed - o->heard_at);
-  const bool steady = reading.fits && (o->heard.motion_samples != 65535u);
-  o->heard_steady = steady ? one_more(o->heard_steady) : 0u;
-  o->heard_rejected = one_more(o->heard_rejected);
-  o->heard_at = (uint16_t)given->missed;
-  learn_turn(&o->heard, &reading);
+  const angle_reading reading = read_angle(&o->seen, given->y, given->missed - o->seen_at);
+  const bool steady = reading.fits && (o->seen.motion_samples != 65535u);
+  o->seen_steady = steady ? one_more(o->seen_steady) : 0u;
+  o->seen_rejected = one_more(o->seen_rejected);
+  o->seen_at = (uint16_t)given->missed;
+  learn_turn(&o->seen, &reading);
 }
 
 #endif
@@ -227,17 +227,17 @@ static unsigned keep_angle(esokit_state *o, const angle_reading *reading, unsign
     status = status | ESOKIT_TURN_ASSUMED;
   }
 #if ESOKIT_GATED_ANGLE
-  if (!reading->heard) {
+  if (!reading->seen) {
     learn_turn(&o->taken, reading);
   }
   hear_angle(o, reading);
-  if (reading->heard) {
-    o->taken = o->heard;
+  if (reading->seen) {
+    o->taken = o->seen;
   } else {
-    o->heard.turns = o->taken.turns; /* counted from what was used */
+    o->seen.turns = o->taken.turns; /* counted from what was used */
   }
-  o->heard_at = 0u;
-  o->heard_rejected = 0u;
+  o->seen_at = 0u;
+  o->seen_rejected = 0u;
 #else
   learn_turn(&o->taken, reading);
 #endif

@@ -19,7 +19,7 @@ R"esokit("
 #endif
 #endif
 #if ESOKIT_MAPPED
-/* ---- What is inside is told the effect of u. */
+/* ---- What is inside is given the effect of u. */
 
 static unsigned update_mapped(esokit_state *o, real y, real u)
 {

@@ -104,10 +104,10 @@ typedef struct {
   esokit_turns taken;
 #endif
 #if ESOKIT_GATED_ANGLE
-  esokit_turns heard; /* those that are rejected, too */
-  uint16_t heard_at; /* samples since one was taken, at the last one */
-  uint8_t heard_steady;
-  uint8_t heard_rejected;
+  esokit_turns seen; /* those that are rejected, too */
+  uint16_t seen_at; /* samples since one was taken, at the last one */
+  uint8_t seen_steady;
+  uint8_t seen_rejected;
 #endif
 #if ESOKIT_MEASURED
   esokit_w w[W_COUNT];
@@ -160,7 +160,7 @@ typedef struct {
   uint8_t mode;
 #endif
 #if ESOKIT_PREDICTIVE
-  uint8_t phase; /* 1: y was told, 2: it is missing, 3 and 4: and u, 5: started */
+  uint8_t phase; /* 1: y was given, 2: it is missing, 3 and 4: and u, 5: started */
 #endif
 #if ESOKIT_CONTROLLER
   uint8_t elsewhere; /* u was commanded by something else since the last sample */

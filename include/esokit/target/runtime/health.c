@@ -208,7 +208,7 @@ static bool sees_wrong_sign(const esokit_state *o)
 /* Until u has moved y the right way. */
 static void remember_sign(esokit_state *o)
 {
-  const bool right = ((double)o->sign_ratio > RIGHT_SIGN) && ((double)o->saturated < SWINGS);
+  const bool right = ((double)o->sign_ratio > RIGHT_SIGN) && ((double)o->saturated < OFTEN_LIMITED);
   if (sees_wrong_sign(o)) {
     o->reversed = true;
   } else if (right && ((double)o->evidence >= FOR_EVIDENCE)) {
@@ -275,7 +275,7 @@ unsigned esokit_diagnose(const esokit_state *o)
   const double saturated = (double)o->saturated;
   const double side = (double)o->side;
   const double limit = ONE_SIDE * saturated;
-  const bool swings = (saturated > SWINGS) && (side < limit) && (side > -limit);
+  const bool swings = (saturated > OFTEN_LIMITED) && (side < limit) && (side > -limit);
   const bool told = evidence >= FOR_EVIDENCE;
   unsigned fault = ESOKIT_NONE;
   if (o->reversed || sees_wrong_sign(o)) {

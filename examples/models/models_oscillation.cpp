@@ -117,7 +117,7 @@ void cogging(Report& report) {
   config.model.speed = {0.4, 2.7};
   const auto following = Following::make(config).value();
   const auto nothing = [](auto&, double) {};
-  const auto told = [](double wrong) {
+  const auto given = [](double wrong) {
     return [wrong](Following& eso, double w) { (void)eso.set_speed(wrong * w / design_speed); };
   };
   const auto chain = chain_eso(observer);
@@ -141,9 +141,9 @@ void cogging(Report& report) {
   const Tracked none =
       show("no model of it", chain, nothing, loop_of<Chain>(chain_config(observer)));
   const Tracked middle = show("resonators at the middle speed", fixed, nothing, resonating);
-  const Tracked right = show("resonators that follow the speed", following, told(1.0), resonating);
-  const Tracked wrong = show("the speed told 5 % too high", following, told(1.05), loop_at(1.05));
-  const Tracked far = show("the speed told 30 % too high", following, told(1.3), loop_at(1.3));
+  const Tracked right = show("resonators that follow the speed", following, given(1.0), resonating);
+  const Tracked wrong = show("the speed given 5 % too high", following, given(1.05), loop_at(1.05));
+  const Tracked far = show("the speed given 30 % too high", following, given(1.3), loop_at(1.3));
   const double size = std::sqrt(2.5);
   report.expect("cogging", "share of the load left, no model", none.rms / size,
                 none.rms > 0.3 * size, "above 0.3");
@@ -307,7 +307,7 @@ void ripple(Report& report) {
 
 int main(int argc, char** argv) {
   Report report(
-      argc, argv, "models", "swing",
+      argc, argv, "models", "oscillation",
       about("Cogging and ripple",
             "Disturbances that oscillate with the speed of a shaft, and at a known frequency."));
   cogging(report);
