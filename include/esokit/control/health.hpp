@@ -56,7 +56,8 @@ struct Health {
   bool reversed = false;  ///< the sign of b0 was found to be wrong, and nothing has contradicted it
 };
 
-/// The likely fault of a loop, the worst first.
+/// The likely fault of a loop: the first that `diagnose` finds, in this order but for the last,
+/// which comes before `saturated`.
 enum class LoopFault : unsigned char {
   none,            ///< no fault found
   wrong_sign,      ///< b0 has the wrong sign
@@ -67,7 +68,7 @@ enum class LoopFault : unsigned char {
   innovation_too_large,   ///< rms above three times that caused by the noise
   gain_too_large_or_disturbed,  ///< the effect of u is cancelled: b0 is too large, or a load drives
                                 ///< u
-  sensor_still,  ///< y does not change while u moves or is at a limit; comes before `saturated`
+  sensor_still,                 ///< y does not change while u moves or is at a limit
 };
 
 /// Limits of `diagnose`. They were tested on simulated drives with each fault and healthy ones, see

@@ -66,7 +66,7 @@ typedef struct {
   bool is_free;
 } esokit_state;
 
-/* The likely fault, the worst first. */
+/* The likely fault: the first that is found, in this order but for the last. */
 #define ESOKIT_NONE 0u
 #define ESOKIT_WRONG_SIGN 1u /* of b0 */
 #define ESOKIT_GAIN_TOO_SMALL 2u /* b0 is several times too small */
