@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Compiles every ```cpp block of the Markdown files and of the comments of the headers:
+# Compiles every ```cpp block of the Markdown files and of the comments of the headers, and the examples
+# of the reference:
 # cmake/readme_snippets.sh [FILE...]
 # A block with main() stands alone; the other blocks of a file follow one another in one function,
 # after what the file declares for them in a comment: <!-- snippets: double y = 0; -->
@@ -122,6 +123,15 @@ done
 if (($# == 0)); then
   headers >"$work/headers.cpp"
   try "$work/headers.cpp" "comments of the headers"
+  # The examples of the reference also run: their settings must be accepted.
+  if "$compiler" -std=c++20 -Iinclude -isystem "$eigen" cmake/reference_examples.cpp -o "$work/examples" 2>"$work/errors" &&
+    "$work/examples" >"$work/said" 2>"$work/errors"; then
+    passed=$((passed + 1))
+  else
+    failed=$((failed + 1))
+    echo "cmake/reference_examples.cpp:"
+    head -n 15 "$work/errors"
+  fi
 fi
 echo "$passed passed, $failed failed"
 ((passed > 0 && failed == 0))
