@@ -115,6 +115,7 @@
 #include <esokit/identify/detail/b0_evidence.hpp>
 #include <esokit/identify/detail/intervals.hpp>
 #include <esokit/identify/detail/order_selection.hpp>
+#include <esokit/identify/detail/row_study.hpp>
 #include <esokit/identify/detail/timed_column.hpp>
 #include <esokit/identify/fit.hpp>
 #include <esokit/identify/identified.hpp>

@@ -21,8 +21,8 @@
 #include <esokit/analysis/impl/peak_gain.ipp>
 #include <esokit/analysis/impl/poles.ipp>
 #include <esokit/analysis/impl/worst_case.ipp>
+#include <esokit/identify/impl/b0_evidence.ipp>
 #include <esokit/identify/impl/fit.ipp>
-#include <esokit/identify/impl/gain_evidence.ipp>
 #include <esokit/identify/impl/identified.ipp>
 #include <esokit/identify/impl/identify.ipp>
 #include <esokit/identify/impl/innovations_filter.ipp>
@@ -30,8 +30,9 @@
 #include <esokit/identify/impl/intervals.ipp>
 #include <esokit/identify/impl/log.ipp>
 #include <esokit/identify/impl/measured_columns.ipp>
-#include <esokit/identify/impl/order_fits.ipp>
+#include <esokit/identify/impl/order_selection.ipp>
 #include <esokit/identify/impl/plateau.ipp>
+#include <esokit/identify/impl/row_study.ipp>
 #include <esokit/identify/impl/second_opinion.ipp>
 #include <esokit/identify/impl/seen_curve.ipp>
 #include <esokit/identify/impl/sinusoids.ipp>
@@ -56,6 +57,7 @@
 #include <esokit/target/impl/written_names.ipp>
 #include <esokit/tune/impl/controller_source.ipp>
 #include <esokit/tune/impl/families.ipp>
+#include <esokit/tune/impl/family_search.ipp>
 #include <esokit/tune/impl/loop_cost.ipp>
 #include <esokit/tune/impl/lqg.ipp>
 #include <esokit/tune/impl/overload.ipp>
@@ -63,5 +65,4 @@
 #include <esokit/tune/impl/plain_pid.ipp>
 #include <esokit/tune/impl/specification.ipp>
 #include <esokit/tune/impl/tune.ipp>
-#include <esokit/tune/impl/tune_search.ipp>
 #include <esokit/tune/impl/tuning.ipp>

@@ -63,5 +63,5 @@ Estimate widened(const Identified& found, const IdentifyOptions& options);
 }  // namespace esokit
 
 #if defined(ESOKIT_HEADER_ONLY)
-#include <esokit/identify/impl/gain_evidence.ipp>
+#include <esokit/identify/impl/b0_evidence.ipp>
 #endif

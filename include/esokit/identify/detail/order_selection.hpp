@@ -97,5 +97,5 @@ bool position_acts(const FitData& data, const OrderFit& order, bool friction);
 }  // namespace esokit
 
 #if defined(ESOKIT_HEADER_ONLY)
-#include <esokit/identify/impl/order_fits.ipp>
+#include <esokit/identify/impl/order_selection.ipp>
 #endif

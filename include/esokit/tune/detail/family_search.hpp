@@ -131,5 +131,5 @@ TuneSearch search_for(const Tuning& tuning, bool given_law);
 }  // namespace esokit
 
 #if defined(ESOKIT_HEADER_ONLY)
-#include <esokit/tune/impl/tune_search.ipp>
+#include <esokit/tune/impl/family_search.ipp>
 #endif
