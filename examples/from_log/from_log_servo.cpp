@@ -249,7 +249,7 @@ int main(int argc, char** argv) {
       .legend(Legend::above)
       .name("log")
       .line(log.t, log.r, {.name = "reference", .color = Color::black, .width = 0.8})
-      .line(log.t, log.y, {.name = "angle, bad PID", .color = Color::grey, .width = 1.2});
+      .line(log.t, log.y, {.name = "angle, bad PID", .color = Color::vermillion, .width = 1.2});
   figure.panel(1, 0)
       .title("before and after")
       .x_label("t (s)")
@@ -257,7 +257,7 @@ int main(int argc, char** argv) {
       .legend(Legend::above)
       .name("angle")
       .line(before.t, before.r, {.name = "reference", .color = Color::black, .dash = Dash::dashed})
-      .line(before.t, before.y, {.name = "bad PID", .color = Color::grey})
+      .line(before.t, before.y, {.name = "bad PID", .color = Color::vermillion})
       .line(after.t, after.y, {.name = "from the log", .color = Color::blue});
   const auto error = [](const Run& run) {
     std::vector<double> e;
@@ -268,14 +268,14 @@ int main(int argc, char** argv) {
       .x_label("t (s)")
       .y_label("error (mrad)")
       .name("error")
-      .line(before.t, error(before), {.color = Color::grey, .column = "bad PID"})
+      .line(before.t, error(before), {.color = Color::vermillion, .column = "bad PID"})
       .line(after.t, error(after), {.color = Color::blue, .column = "from the log"});
   figure.panel(3, 0)
       .x_label("t (s)")
       .y_label("u (V)")
       .name("u")
       .line(after.t, after.u, {.color = Color::blue, .width = 1.0, .column = "from the log"})
-      .line(before.t, before.u, {.color = Color::grey, .width = 1.2, .column = "bad PID"});
+      .line(before.t, before.u, {.color = Color::vermillion, .width = 1.2, .column = "bad PID"});
   report.add(figure);
 
   // For the README: the same machine before and after.
@@ -290,13 +290,13 @@ int main(int argc, char** argv) {
       .legend(Legend::above)
       .name("angle")
       .line(before.t, before.r, dashed)
-      .line(before.t, before.y, {.name = "old PID", .color = Color::grey})
+      .line(before.t, before.y, {.name = "old PID", .color = Color::vermillion})
       .line(after.t, after.y, {.name = "from the log", .color = Color::blue});
   result.panel(0, 1)
       .x_label("t (s)")
       .y_label("error (mrad)")
       .name("error")
-      .line(before.t, error(before), {.color = Color::grey, .column = "old PID"})
+      .line(before.t, error(before), {.color = Color::vermillion, .column = "old PID"})
       .line(after.t, error(after), {.color = Color::blue, .column = "from the log"});
   report.add(result);
   return report.finish();
