@@ -55,7 +55,8 @@ def spoken(name, text):
     if name.endswith(".md"):
         return re.sub(r"`[^`\n]*`", "", CODE.sub("", text))
     parts = []
-    for run in re.findall(r'(?:[ \t]*//[^\n]*\n)+|//[^\n]*\n(?:[ \t]*//[^\n]*\n)*|/\*.*?\*/|"(?:[^"\\\n]|\\.)*"', text, re.DOTALL):
+    strings = r"|`[^`]*`|'(?:[^'\\\n]|\\.)*'" if name.endswith(".js") else ""
+    for run in re.findall(r'(?:[ \t]*//[^\n]*\n)+|//[^\n]*\n(?:[ \t]*//[^\n]*\n)*|/\*.*?\*/|"(?:[^"\\\n]|\\.)*"' + strings, text, re.DOTALL):
         comment = re.sub(r"^[ \t]*(?://+<?|/\*+|\*/?) ?", "", run, flags=re.MULTILINE)
         parts.append(CODE.sub("", re.sub(r"@\w+", "\n\n", comment)))
     return "\n\n".join(parts)
@@ -111,7 +112,8 @@ def self_test():
         print(f"self-test: {case}: {problems(case[0], case[1])}")
     pattern, _ = glossary("x\n| not | but |\n|---|---|\n| told, come back | given |\n| rival | baseline |\n\ny")
     for name, text, count in (("a.md", "told `told` Rival\n```\ntold\n```\nretold rival-up come back", 3),
-                              ("a.hpp", 'told(); // told\n/* a rival\n told */ f("come back")', 4)):
+                              ("a.hpp", 'told(); // told\n/* a rival\n told */ f("come back")', 4),
+                              ("a.js", "told; f('told', `a ${x} rival`)", 2)):
         cases.append(name)
         if len(pattern.findall(spoken(name, text))) != count:
             wrong.append(name)

@@ -43,6 +43,7 @@ parts = {
     } for name, _, options, source in samples]).encode()),
     "buttons": " ".join(f'<button data-log="{name}">{html.escape(words)}</button>'
                         for name, words, _, _ in samples),
+    "licence": html.escape(text(here.parents[1] / "LICENSE")),
     "script": text(here / "play.js"),
     "worker": text(here / "worker.js"),
     "drop": text(here / "drop.js"),

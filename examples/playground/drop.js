@@ -342,6 +342,7 @@ $('savelogsvg').onclick = () => save(stem() + '.svg', 'image/svg+xml',
 $('savelogcsv').onclick = () => save(stem() + '-figures.csv', 'text/csv', log_result.figures.map((one) => one.numbers).join(''));
 $('toplay').onclick = () => {
   read(log_result.address);
+  $('brought').textContent = log_result.taken;
   view('play');
   update(true);
   $('tab-play').focus();

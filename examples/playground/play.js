@@ -324,7 +324,7 @@ function sentences(now) {
   const both = (a, b) => `${shown(a)} instead of ${shown(b)}`;
   if (state.wrong) {
     const w = without('wrong').numbers[0];
-    told.push(`b₀ is told twice as large: the observer counts what u does not do as disturbance; after the load y is off by up to ${both(n.load_peak, w.load_peak)}, and the loop is ${n.stable ? 'stable' : 'not stable'}.`);
+    told.push(`b₀ is given twice as large: the observer counts what u does not do as disturbance; after the load y is off by up to ${both(n.load_peak, w.load_peak)}, and the loop is ${n.stable ? 'stable' : 'not stable'}.`);
   }
   if (state.lose) {
     const w = without('lose').numbers[0];
@@ -337,7 +337,7 @@ function sentences(now) {
     told.push(`One measurement, a quarter into the run, is NaN: it does not get into the estimate, u stays finite, and y differs from the run without it by ${shown(change)} at most.`);
   }
   if (state.saturate) {
-    told.push(`The step is now ${shown(now.r[0])}, for which the law asks for three times the limit: u is at its limits in ${shown(100 * n.at_limit)} % of the samples, and y overshoots by ${shown(100 * n.overshoot)} %; the observer is told the u that was applied, so there is no integral to wind up.`);
+    told.push(`The step is now ${shown(now.r[0])}, for which the law asks for three times the limit: u is at its limits in ${shown(100 * n.at_limit)} % of the samples, and y overshoots by ${shown(100 * n.overshoot)} %. The observer gets the u that was applied, so there is no integral to wind up.`);
   }
   if (state.noisy) {
     const w = without('noisy').numbers[0];
@@ -353,14 +353,19 @@ function sentences(now) {
 // ---- controls ----
 
 const STEPS = 1000;
+// A bandwidth above 1 / T is of no use: the slider ends there, the field beside it does not.
+const high_of = (field) => field.name.endsWith('_bandwidth') && state.sample_time > 0 ?
+  Math.min(field.high, Math.max(10 * field.low, 1 / state.sample_time)) : field.high;
+// What a load acts on, in words.
+const acts_on = () => [['the rate of y', 'y/s'], ['acceleration', 'y/s²'], ['jerk', 'y/s³']][state.order - 1] || ['y⁽ⁿ⁾', ''];
 function to_slider(field, value) {
   if (field.kind === 1 && !(value > 0)) return 0;
-  const share = Math.log(value / field.low) / Math.log(field.high / field.low);
+  const share = Math.log(value / field.low) / Math.log(high_of(field) / field.low);
   return Math.round(Math.min(Math.max(share, 0), 1) * (STEPS - 1)) + 1;
 }
 function from_slider(field, at) {
   if (field.kind === 1 && at === 0) return 0;
-  const value = field.low * (field.high / field.low) ** ((Math.max(at, 1) - 1) / (STEPS - 1));
+  const value = field.low * (high_of(field) / field.low) ** ((Math.max(at, 1) - 1) / (STEPS - 1));
   return field.name === 'samples' ? Math.round(value) : Number(value.toPrecision(3));
 }
 
@@ -420,6 +425,7 @@ function build() {
         if (document.activeElement !== slider) slider.value = to_slider(field, state[field.name]);
         slider.setAttribute('aria-valuetext', shown(state[field.name]) + ' ' + field.unit);
         if (document.activeElement !== number) number.value = state[field.name];
+        if (field.name === 'load') [label.firstChild.textContent, unit.textContent] = [`load on ${acts_on()[0]} `, acts_on()[1]];
       };
       slider.setAttribute('aria-description', field.hint);
       controls[field.name].bad = (bad) => number.setAttribute('aria-invalid', bad);
@@ -437,7 +443,7 @@ function build() {
   }
   const again = document.createElement('button');
   again.textContent = 'Start over';
-  again.onclick = () => { state = { ...standard }; changed(true); };
+  again.onclick = () => { state = { ...standard }; $('brought').textContent = ''; changed(true); };
   $('happens').append(again);
 }
 
@@ -568,7 +574,7 @@ function visit() {
     number.value = before;
     number.dispatchEvent(new Event('input'));
     update(true);
-    expect($('refusal').textContent === '', `${field.name} does not come back`);
+    expect($('refusal').textContent === '', `${field.name} does not take back what was refused`);
   }
   read('order=7&samples=1e9&gain=x&other=3');
   update(true);
