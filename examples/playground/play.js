@@ -337,7 +337,7 @@ function sentences(now) {
     told.push(`One measurement, a quarter into the run, is NaN: it does not get into the estimate, u stays finite, and y differs from the run without it by ${shown(change)} at most.`);
   }
   if (state.saturate) {
-    told.push(`The step is now ${shown(now.r[0])}, for which the law asks for three times the limit: u is at its limits in ${shown(100 * n.at_limit)} % of the samples, and y overshoots by ${shown(100 * n.overshoot)} %. The observer gets the u that was applied, so there is no integral to wind up.`);
+    told.push(`The step is now ${shown(now.r[0])}, for which the law asks for three times the limit. So u is at its limits in ${shown(100 * n.at_limit)} % of the samples, and y overshoots by ${shown(100 * n.overshoot)} %. The observer gets the u that was applied, so there is no integral to wind up.`);
   }
   if (state.noisy) {
     const w = without('noisy').numbers[0];
