@@ -7,7 +7,7 @@ set(esokit_units
     "adapter/decorators adapter/outlier_gate"
     "adapter/guarded adapter/guarded_model adapter/measured"
     "analysis/controllers analysis/margins"
-    "analysis/covariance analysis/frequency_response analysis/loop analysis/measured_response"
+    "analysis/covariance analysis/disturbance_alarm analysis/frequency_response analysis/loop analysis/measured_response"
     "analysis/dense analysis/error_bound analysis/integrator_chain"
     "control/absurd_numbers control/adrc control/controller_static control/missing_samples control/nonlinear_feedback control/pack control/softening"
     "control/adrc_law control/health control/pairs_law control/reconvergence control/time_proportioned control/tracking_differentiator"

@@ -18,6 +18,7 @@
 #include <esokit/analysis/delay_margin.hpp>
 #include <esokit/analysis/detail/eigenvalues.hpp>
 #include <esokit/analysis/detail/loop_scan.hpp>
+#include <esokit/analysis/disturbance_alarm.hpp>
 #include <esokit/analysis/dynamic_matrix.hpp>
 #include <esokit/analysis/error_bound.hpp>
 #include <esokit/analysis/frequency_response.hpp>

@@ -6,6 +6,7 @@
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/analysis/covariance.hpp>
 #include <esokit/analysis/delay_margin.hpp>
+#include <esokit/analysis/disturbance_alarm.hpp>
 #include <esokit/analysis/error_bound.hpp>
 #include <esokit/analysis/frequency_response.hpp>
 #include <esokit/analysis/health_text.hpp>
@@ -185,6 +186,22 @@ void ask_loop(Study& study, const Loop& loop) {
     study.finite("noise", found->output);
     study.finite("noise", found->control);
     study.finite("noise", found->estimates);
+  }
+  const DisturbanceAlarmConfig of_alarm{
+      .false_alarms_per_hour = study.number<double>("false_alarms_per_hour", {1e-3, 1e3, true}),
+      .load = study.number<double>("load", {1e-2, 1e2, true, true}),
+      .noise = of};
+  const int last = loop.system().c.rows() - 2 * loop.channels() - 1;
+  // Slower loops are asked for longer responses than a case has time for.
+  if (loop.stability_abscissa() < -1e-4) {
+    if (const auto alarm =
+            study.answer("disturbance_alarm", disturbance_alarm(loop, last, of_alarm))) {
+      study.finite("disturbance_alarm", alarm->threshold);
+      for (const double limit : {alarm->least_load, alarm->delay, alarm->latest}) {
+        study.limit("disturbance_alarm", limit);
+      }
+      if (alarm->latest < alarm->delay) study.fail("disturbance_alarm", "surely before at all");
+    }
   }
   const LoopStep step{.duration = study.number<double>("duration", {1e-2, 1, true}),
                       .sample_time = loop.sample_time() > 0.0 ? 0.0 : 1e-2};

@@ -16,6 +16,14 @@ struct LoopNoise {
   std::vector<double> disturbance{};  ///< of d, independent in each sample and held until the next
 };
 
+namespace detail {
+
+/// The covariance of (r, v, d) of a loop at rest, or what is wrong with the noise or the loop.
+Expected<DynamicMatrix<double>, Error<double>> input_covariance(const Loop& loop,
+                                                                const LoopNoise& of);
+
+}  // namespace detail
+
 /// Standard deviations of the signals of a loop, one entry per channel (for estimates one per row,
 /// channel after channel).
 struct LoopDeviations {

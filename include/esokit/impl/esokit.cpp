@@ -6,6 +6,7 @@
 
 #include <esokit/analysis/impl/covariance.ipp>
 #include <esokit/analysis/impl/delay_margin.ipp>
+#include <esokit/analysis/impl/disturbance_alarm.ipp>
 #include <esokit/analysis/impl/eigenvalues.ipp>
 #include <esokit/analysis/impl/frequency_response.ipp>
 #include <esokit/analysis/impl/linear_controller.ipp>

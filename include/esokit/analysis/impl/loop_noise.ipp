@@ -8,12 +8,12 @@
 
 namespace esokit {
 
-ESOKIT_FUNCTION Expected<LoopDeviations, Error<double>> noise(const Loop& loop,
-                                                              const LoopNoise& of) {
-  const DynamicSystem& system = loop.system();
+namespace detail {
+
+ESOKIT_FUNCTION Expected<DynamicMatrix<double>, Error<double>> input_covariance(
+    const Loop& loop, const LoopNoise& of) {
   const int q = loop.channels();
-  const int inputs = system.b.cols();
-  const int outputs = system.c.rows();
+  const int inputs = loop.system().b.cols();
   DynamicMatrix<double> input(inputs, inputs);
   Rules<double> rules;
   const auto take = [&](const char* field, const std::vector<double>& deviations, int first,
@@ -32,7 +32,18 @@ ESOKIT_FUNCTION Expected<LoopDeviations, Error<double>> noise(const Loop& loop,
   rules.demand(loop.stable(), "stability_abscissa", loop.stability_abscissa(),
                "must be negative: a loop that is not stable has no steady state");
   if (!rules) return rules.error();
-  const auto covariance = output_covariance(system, input);
+  return input;
+}
+
+}  // namespace detail
+
+ESOKIT_FUNCTION Expected<LoopDeviations, Error<double>> noise(const Loop& loop,
+                                                              const LoopNoise& of) {
+  const int q = loop.channels();
+  const int outputs = loop.system().c.rows();
+  const auto input = detail::input_covariance(loop, of);
+  if (!input) return input.error();
+  const auto covariance = output_covariance(loop.system(), *input);
   if (!covariance) return covariance.error();
   LoopDeviations deviations;
   for (int i = 0; i < outputs; ++i) {
