@@ -181,6 +181,10 @@ requires(detail::goes_into_a_loop<Observer>()) class Adapter
       requires(observer_traits<Observer>.varies_time) {
     return observer_.set_step_time(seconds);
   }
+  Expected<int, Error<scalar_type>> elapsed(const scalar_type& seconds) noexcept
+      requires(observer_traits<Observer>.varies_time) {
+    return observer_.elapsed(seconds);
+  }
   [[nodiscard]] const scalar_type& step_time() const noexcept
       requires(observer_traits<Observer>.varies_time) {
     return observer_.step_time();

@@ -131,6 +131,16 @@ requires(detail::shifts_load<Observer>()) class Measured
     return {};
   }
 
+  /// Says how much time has passed, see VariableTime::elapsed.
+  template <class O = Observer>
+  requires(observer_traits<O>.varies_time) Expected<int, Error<S>> elapsed(const S& seconds)
+  noexcept {
+    const auto steps = observer_.elapsed(seconds);
+    if (!steps || *steps == 0) return steps;
+    for (auto& path : paths_) path.set_time(observer_.step_time());
+    return steps;
+  }
+
   /// f, what all w add to y^(n) in the mean of the coming sample, unit of y^(n) (n of the plant).
   [[nodiscard]] const S& known_part() const noexcept { return told_; }
   /// dhat without f, unit of y^(n); limited to the range of the scalar.

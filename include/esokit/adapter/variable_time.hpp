@@ -2,9 +2,11 @@
 /// VariableTime: an observer whose sample time changes from step to step.
 #pragma once
 
+#include <cmath>
 #include <esokit/adapter/adapter.hpp>
 #include <esokit/core/check.hpp>
 #include <esokit/core/detail/type_tag.hpp>
+#include <esokit/math/detail/fine_sum.hpp>
 
 namespace esokit {
 
@@ -18,7 +20,8 @@ requires(detail::goes_into_a_loop<Observer>()) struct VariableTimeConfig {
   S ratio = S(4);                        ///< above 1: steps may take T / ratio .. T ratio
 };
 
-/// Before each step the observer is given how long the step took; model and gains follow exactly.
+/// Before each step the observer is given how long the step took; model and gains follow exactly. A
+/// controller takes any time, `elapsed(seconds)`, also a pause.
 ///
 /// A step with another length than the last one is a retune: the whole `make` of the observer, with
 /// its checks and one expm1 per level (LinearEso<2>: 40 .. 80 ns on a desktop, the time of some
@@ -67,9 +70,10 @@ requires(detail::restarts<Observer>()) class VariableTime
     if (Rules<S> rules; !rules.above("ratio", config.ratio, S(1))) return rules.error();
     auto observer = Observer::make(config.observer);
     if (!observer) return observer.error();
-    // Every step time in the range must give a valid config; it does if both ends do.
+    // Every step time in the range must give a valid config; it does if both ends do. A time above
+    // T ratio is divided into steps of T / 2 and more.
     S longest{};
-    for (const S factor : {config.ratio, S(1) / config.ratio}) {
+    for (const S factor : {config.ratio, S(0.5), S(1) / config.ratio}) {
       auto edge = config.observer;
       auto& chain = chain_config<Observer>(edge);
       chain.sample_time = chain.sample_time * factor;
@@ -111,6 +115,31 @@ requires(detail::restarts<Observer>()) class VariableTime
     }
     step_time_ = seconds;
     return {};
+  }
+
+  /// Says how much time has passed since the last sample: any, at the cost of at most max_gap + 1
+  /// predictions more (of the config). A time above T ratio is divided into equal steps of at most
+  /// T; after more than max_gap + 1 of them the next correction restarts. One below T / ratio is
+  /// kept and added to the next one.
+  /// @return how many steps have to follow, each of the new `step_time()`: `predict(u)`, and the
+  /// last one is `update(y, u)`. 0: none, y comes too soon. Or the error of a time that is negative
+  /// or not finite, which changes nothing
+  Expected<int, Error<S>> elapsed(const S& seconds) noexcept {
+    if (Rules<S> rules; !rules.not_negative("elapsed", seconds)) return rules.error();
+    const auto& chain = chain_config<Observer>(config_.observer);
+    const S nominal = chain.sample_time;
+    kept_.add(seconds);
+    const S due = kept_.value();
+    if (!detail::at_most(S(nominal / config_.ratio), due)) return 0;
+    kept_ = {};
+    step_time_ = due;
+    if (detail::at_most(due, S(nominal * config_.ratio))) return 1;
+    const int restart = chain.max_gap + 2;
+    step_time_ = nominal;
+    if (!(due < static_cast<S>(restart) * nominal)) return restart;
+    const S steps = (std::ceil)(due / nominal * (S(1) - S(4) * detail::rounding<S>()));
+    step_time_ = due / steps;
+    return static_cast<int>(steps);
   }
 
   /// One sample of length `step_time`, see PredictorCorrector::update.
@@ -200,7 +229,8 @@ requires(detail::restarts<Observer>()) class VariableTime
 
   Config config_;
   S step_time_;
-  S current_;  ///< present sample time of the observer
+  detail::FineSum<S> kept_{};  ///< time too short for a step, s
+  S current_;                  ///< present sample time of the observer
   S elapsed_{};
   S longest_;  ///< time since the last correction that the next one may bridge
 };

@@ -221,28 +221,29 @@ requires(detail::goes_into_a_loop<Observer>()) class Adrc {
     return {};
   }
 
-  /// Sets the length of the next step, s; for Adrc<VariableTime<..>>. The observer's gains, the
-  /// rate limit and, if placed in the sampled domain, the controller's gains follow. A length that
-  /// the observer's config does not allow is refused and changes nothing.
+  /// Says that `seconds` have passed since the last sample: any time, before each one. For
+  /// Adrc<VariableTime<..>>:
+  ///
+  ///     if (controller.elapsed(seconds)) u = controller.update(y, r);
+  ///
+  /// After a pause the observer first predicts in steps of at most T what happened under the u that
+  /// was held, so that nothing is lost; after more than max_gap + 1 of them it restarts. With a
+  /// time below T / ratio, also zero, `update` changes nothing and returns the last u: that time
+  /// counts with the next one. A time that is negative or not finite is refused and changes
+  /// nothing. The observer's gains, the rate limit (for one step, also after a pause) and, if
+  /// placed in the sampled domain, the controller's gains follow.
+  template <class O = Observer>
+  requires(observer_traits<O>.varies_time) Check<S> elapsed(const S& seconds)
+  noexcept {
+    return with_gains([&](Loop& loop) { return loop.elapsed(seconds); });
+  }
+
+  /// The same for all of the next steps, each of that length: one outside T / ratio .. T ratio is
+  /// refused and changes nothing.
   template <class O = Observer>
   requires(observer_traits<O>.varies_time) Check<S> set_step_time(const S& seconds)
   noexcept {
-    const bool gains_follow = spec_.domain == TimeDomain::sampled && spec_.bandwidth > S(0);
-    if (!gains_follow || !is_finite(seconds) || !(seconds > S(0))) {
-      return loop_.set_step_time(seconds);
-    }
-    const auto gains = feedback_gain<order, S>(spec_, seconds);
-    if (!gains) return gains.error();
-    const auto law = Law::make({.gains = *gains, .input_gain = law_.input_gain()});
-    if (!law) return law.error();
-    const auto& limiter = loop_.limiter();
-    const auto soft =
-        Soft::make(*law, {.lower = limiter.lower(), .upper = limiter.upper()}, soft_.on());
-    if (!soft) return soft.error();
-    if (auto ok = loop_.set_step_time(seconds); !ok) return ok;
-    law_ = *law;
-    soft_.adopt(*soft);
-    return {};
+    return with_gains([&](Loop& loop) { return loop.set_step_time(seconds); });
   }
 
   /// The observer, for its estimates.
@@ -326,6 +327,26 @@ requires(detail::goes_into_a_loop<Observer>()) class Adrc {
     if constexpr (error_based)
       chain_config<Observer>(observer).input_gain = -chain_config<Observer>(observer).input_gain;
     return observer;
+  }
+
+  /// Changes the step time of the loop, and by it the gains of the sampled domain.
+  template <class Change>
+  Check<S> with_gains(Change change) noexcept {
+    if (!(spec_.domain == TimeDomain::sampled && spec_.bandwidth > S(0))) return change(loop_);
+    Loop next = loop_;
+    if (auto ok = change(next); !ok) return ok;
+    const auto gains = feedback_gain<order, S>(spec_, next.observer().step_time());
+    if (!gains) return gains.error();
+    const auto law = Law::make({.gains = *gains, .input_gain = law_.input_gain()});
+    if (!law) return law.error();
+    const auto& limiter = loop_.limiter();
+    const auto soft =
+        Soft::make(*law, {.lower = limiter.lower(), .upper = limiter.upper()}, soft_.on());
+    if (!soft) return soft.error();
+    loop_ = next;
+    law_ = *law;
+    soft_.adopt(*soft);
+    return {};
   }
 
   static Expected<Weights, Error<S>> scaled(const Law& law, const Observer& observer) {

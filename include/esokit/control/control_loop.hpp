@@ -274,6 +274,7 @@ class ControlLoop {
   /// One sample without a measurement.
   template <class Law>
   S step_without_measurement(Law&& law) noexcept {
+    if (too_soon()) return output();
     skip_measurement(limiter_.last());
     return put_out(law);
   }
@@ -326,16 +327,25 @@ class ControlLoop {
     return {};
   }
 
-  /// Sets the length of the next step (s) if the observer is VariableTime; the rate limit follows.
-  /// A length that the observer refuses changes nothing.
+  /// Says how much time has passed since the last step (s) if the observer is VariableTime: any. It
+  /// is predicted in as many steps as needed, with what drove the chain since the last step.
+  template <class O = Observer>
+  requires(observer_traits<O>.varies_time) Check<S> elapsed(const S& seconds)
+  noexcept {
+    O next = observer_;
+    const auto steps = next.elapsed(seconds);
+    if (!steps) return steps.error();
+    return take_time(next, *steps);
+  }
+
+  /// Sets the length of the next steps (s) if the observer is VariableTime; the rate limit follows.
+  /// A length that the observer or the limiter refuses changes nothing.
   template <class O = Observer>
   requires(observer_traits<O>.varies_time) Check<S> set_step_time(const S& seconds)
   noexcept {
-    if (auto ok = observer_.set_step_time(seconds); !ok) return ok;
-    const auto limiter = Limiter<S>::make(set_.limits, seconds);
-    if (!limiter) return limiter.error();
-    limiter_.adopt(*limiter, output());
-    return {};
+    O next = observer_;
+    if (auto ok = next.set_step_time(seconds); !ok) return ok;
+    return take_time(next, 1);
   }
 
   /// The observer, for its estimates.
@@ -361,11 +371,16 @@ class ControlLoop {
   friend struct detail::LaneAccess;
   friend struct detail::RecordAccess;
   static constexpr bool has_step_time = observer_traits<Observer>.varies_time;
-  static constexpr int data_members = 10;
+  static constexpr int data_members = 11;
   struct NoLimits {
     constexpr NoLimits() = default;
     constexpr explicit NoLimits(const Limits<S>&) {}
   };
+  /// Steps that the next one consists of, by the time that has passed; 0: too little for one.
+  struct Steps {
+    std::uint16_t due = 1;
+  };
+  struct OneStep {};
   /// What a retune replaces.
   struct Set {
     S hold_input{};
@@ -398,6 +413,20 @@ class ControlLoop {
     if (hold_samples > 0) limiter_.track(requested_ = limiter_.within(set_.hold_input));
   }
 
+  /// What follows from the step time of `next`, the observer.
+  template <class O>
+  Check<S> take_time(const O& next, int steps) noexcept {
+    if (steps > 0) {
+      const auto limiter = Limiter<S>::make(set_.limits, next.step_time());
+      if (!limiter) return limiter.error();
+      limiter_.adopt(*limiter, output());
+    }
+    observer_ = next;
+    steps_.due = static_cast<std::uint16_t>(steps);
+    set_mode(mode_);
+    return {};
+  }
+
   /// u is commanded elsewhere.
   StatusType take_over(S u) noexcept {
     const auto good = is_finite(u);
@@ -408,7 +437,7 @@ class ControlLoop {
   /// One sample with a u from elsewhere.
   void follow(S measured, S drive, StatusType told) noexcept {
     if (mode_ == LoopMode::start_hold) mode_ = LoopMode::running;
-    observe_specially<false>(measured, drive);
+    if (!too_soon()) observe_specially<false>(measured, drive);
     status_ = status_ | told;
     requested_ = limiter_.last();
     elsewhere_ = true;
@@ -418,6 +447,7 @@ class ControlLoop {
   template <bool Advanced, class Law>
   ESOKIT_INLINE S step_any(S measured, S drive, Law& law) noexcept {
     if (special_) [[unlikely]] {
+      if (too_soon()) return output();
       observe_specially<Advanced>(measured, drive);
       return put_out(law);
     }
@@ -478,6 +508,7 @@ class ControlLoop {
 
   template <bool Advanced>
   ESOKIT_COLD void observe_specially(S measured, S drive) noexcept {
+    pass_pause(drive);
     if (phase_ != 0) {
       skip_measurement(drive);
       return;
@@ -490,7 +521,26 @@ class ControlLoop {
     if (as_planned && status_ == StepStatus::gap_bridged) status_ = StepStatus::ok;
   }
 
+  /// Whether no time has passed, or too little for a step.
+  [[nodiscard]] bool too_soon() const noexcept {
+    if constexpr (has_step_time) {
+      return steps_.due == 0;
+    } else {
+      return false;
+    }
+  }
+
+  /// All steps since the last one, but for the one that is to follow.
+  void pass_pause([[maybe_unused]] S drive) noexcept {
+    if constexpr (has_step_time) {
+      if (steps_.due == 1) return;
+      for (; steps_.due > 1; --steps_.due) (void)observer_.predict(drive);
+      set_mode(mode_);
+    }
+  }
+
   void skip_measurement(S drive) noexcept {
+    pass_pause(drive);
     phase_ = next_phase();
     status_ = observer_.predict(drive);
     judge_missing();
@@ -526,6 +576,7 @@ class ControlLoop {
     mode_ = mode;
     special_ = !(mode == LoopMode::running) || !(set_.divider == 1) || set_.watched == true ||
                elsewhere_ == true;
+    if constexpr (has_step_time) special_ = special_ || steps_.due != 1;
   }
 
   [[nodiscard]] std::uint16_t next_phase() const noexcept {
@@ -539,6 +590,7 @@ class ControlLoop {
   Lanes<std::uint32_t, S> hold_left_;
   [[no_unique_address]] Limiter<S> limiter_;
   Lanes<std::uint16_t, S> phase_{};
+  [[no_unique_address]] std::conditional_t<has_step_time, Steps, OneStep> steps_{};
   Lanes<bool, S> elsewhere_{false};  ///< u was commanded by something else since the last step
   /// True if anything besides the law has to be done: one test in the hot path.
   Lanes<bool, S> special_{false};

@@ -22,7 +22,7 @@ struct ControllerTraits {
   bool takes_derivatives = false;
 
   bool knows_sample_time = false;  ///< `sample_time() const`, s
-  bool varies_time = false;        ///< `set_step_time(seconds)`, before each step
+  bool varies_time = false;        ///< `elapsed(seconds)`, before each step
   bool takes_measured = false;     ///< `measured(w)` before each sample, see Measured
   bool observes = false;  ///< `observer() const`, with `total_disturbance()`; for one channel only
 };
@@ -91,7 +91,7 @@ concept Controller =
      }) &&
     (!controller_traits<C>.varies_time ||
      requires(C & controller, const typename C::scalar_type& seconds) {
-       { controller.set_step_time(seconds) } -> std::same_as<Check<typename C::scalar_type>>;
+       { controller.elapsed(seconds) } -> std::same_as<Check<typename C::scalar_type>>;
      }) &&
     (!controller_traits<C>.observes || requires(const C& controller) {
       { controller.observer().total_disturbance() } -> std::convertible_to<typename C::scalar_type>;

@@ -150,10 +150,15 @@ requires(detail::goes_into_a_loop<Observer>()) class DisturbanceCompensator {
     return {};
   }
 
-  /// Sets the length of the next step, s; see Adrc::set_step_time.
+  /// Says how much time has passed, or sets the length of the next steps, s; see Adrc.
+  /// @{
+  template <class O = Observer>
+  requires(observer_traits<O>.varies_time) Check<S> elapsed(const S& seconds)
+  noexcept { return loop_.elapsed(seconds); }
   template <class O = Observer>
   requires(observer_traits<O>.varies_time) Check<S> set_step_time(const S& seconds)
   noexcept { return loop_.set_step_time(seconds); }
+  /// @}
 
   /// K dhat, which is added to u0; limited to the range of the scalar.
   [[nodiscard]] S compensation() const noexcept {

@@ -69,8 +69,8 @@ struct ObserverTraits {
   /// Disturbances are measured: `measured(w)` before each step, `revise_measured()`,
   /// `settle_measured()`, see Measured.
   bool takes_measured = false;
-  bool varies_time = false;  ///< `set_step_time(seconds)`, before each step, and
-                             ///< `step_time() const`, its present length, and `bridges(steps)
+  bool varies_time = false;  ///< `set_step_time(seconds)` or `elapsed(seconds)`, before each step,
+                             ///< and `step_time() const`, its present length, and `bridges(steps)
                              ///< const`, see VariableTime
   bool gates_outliers =
       false;  ///< `accepts(y) const`: false if `correct` would reject y as an outlier
@@ -161,6 +161,7 @@ concept TakesOneOrSeveral = requires(O& o, const typename O::scalar_type& s) {
   HOOK(TakesMeasured, takes_measured, revise_measured, o.revise_measured(); o.settle_measured();  \
        requires TakesOneOrSeveral<O>;)                                                            \
   HOOK(VariesTime, varies_time, set_step_time, { o.set_step_time(s) } -> std::same_as<Check<S>>;  \
+       { o.elapsed(s) } -> std::same_as<Expected<int, Error<S>>>;                                 \
        { fixed.step_time() } -> std::convertible_to<S>;                                           \
        { fixed.bridges(1) } -> std::same_as<bool>;)                                               \
   MISTAKEN(set_sample_time)                                                                       \

@@ -288,7 +288,7 @@ class Run {
       const Output y = output<Plain>(t, x);
       const Output measurement = Plain ? y : chance_.measured(t, y);
       if constexpr (!Even && controller_traits<C>.varies_time) {
-        if (const auto ok = controller.set_step_time(Own(passed)); !ok) {
+        if (const auto ok = controller.elapsed(Own(passed)); !ok) {
           return as_error<Time>(ok.error());
         }
       }
