@@ -303,6 +303,68 @@ double tracking_error(const Faults& faults, std::uint64_t seed) {
   return 1e3 * std::sqrt(sum / time);
 }
 
+// ---- a pause of the loop
+
+struct Paused {
+  std::vector<double> t, disturbance, error;
+  double largest = 0;  ///< abs(dhat - d) from the pause on
+};
+
+/// An axis at constant speed; the loop stands still for 20 samples, while u is held. Either it says
+/// how much time has passed, or a time that is no step of the observer is left out.
+Paused paused(bool says) {
+  constexpr double speed = 5, begin = 0.5, end = 0.75;
+  using Timed = esokit::Adrc<esokit::VariableTime<Linear>>;
+  auto controller = Timed::make({.observer = {.observer = linear(), .ratio = 4},
+                                 .controller_bandwidth = controller_bandwidth})
+                        .value();
+  Paused run;
+  State x(0, speed);
+  (void)controller.start(0, steady_input);
+  double u = steady_input, t = 0;
+  for (int k = 0; t < end; ++k) {
+    const double dt = k == 600 ? 20 * sample_time : sample_time;
+    const double a = disturbance + gain * u;
+    x = State(x(0) + dt * x(1) + dt * dt / 2 * a, x(1) + dt * a);
+    t += dt;
+    if (says ? controller.elapsed(dt) : controller.set_step_time(dt)) {
+      u = controller.update(x(0), {speed * t, speed});
+    }
+    const double off = controller.observer().total_disturbance() - disturbance;
+    if (k >= 600) run.largest = std::max(run.largest, std::abs(off));
+    if (t < begin) continue;
+    run.t.push_back(t);
+    run.disturbance.push_back(disturbance + off);
+    run.error.push_back(1e3 * (speed * t - x(0)));
+  }
+  return run;
+}
+
+void pause(Report& report) {
+  const Paused lost = paused(false), said = paused(true);
+  report.expect("a pause of 20 samples, said", "largest abs(dhat - d) after it", said.largest,
+                said.largest < 1e-3, "below 1e-3");
+  report.expect("a pause of 20 samples, left out", "largest abs(dhat - d) after it", lost.largest,
+                lost.largest > 30, "above 30");
+  Figure figure("pause", {.rows = 2, .columns = 1, .panel_height = 150});
+  figure.caption(
+      "An axis at constant speed; the loop pauses for 20 samples while u is held. If the observer "
+      "is not given that time, it takes the way of the axis for a load.");
+  auto& disturbances =
+      figure.panel(0, 0).y_label("disturbance (1/s2)").legend(Legend::above).x_range(0.5, 0.75);
+  auto& errors = figure.panel(1, 0).x_label("t (s)").y_label("r - y (1e-3)").x_range(0.5, 0.75);
+  disturbances.name("estimate");
+  errors.name("error");
+  const auto draw = [&](const Paused& run, Style style) {
+    disturbances.line(run.t, run.disturbance, style);
+    style.name.clear();
+    errors.line(run.t, run.error, style);
+  };
+  draw(lost, {.name = "pause left out", .color = Color::vermillion, .width = 1.3});
+  draw(said, {.name = "elapsed", .color = Color::blue, .width = 2.4});
+  report.add(figure);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -382,5 +444,6 @@ int main(int argc, char** argv) {
                "Sine as the reference and as the disturbance, T = 2 ms, noise on y: RMS tracking "
                "error in 1e-3, mean (standard deviation) over 20 seeds",
                {"case", "RMS error", "ratio"}, rows);
+  pause(report);
   return report.finish();
 }

@@ -94,10 +94,10 @@ static_assert(!Controller<Declares<ControllerTraits{.observes = true}>, double>)
 
 struct KnowsTime : Declares<ControllerTraits{.knows_sample_time = true, .varies_time = true}> {
   double sample_time() const;
-  Check<double> set_step_time(double seconds);
+  Check<double> elapsed(double seconds);
 };
 struct TellsNoError : KnowsTime {
-  void set_step_time(double seconds);
+  void elapsed(double seconds);
 };
 struct ForgetsConst : KnowsTime {
   double sample_time();

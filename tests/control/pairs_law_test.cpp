@@ -39,6 +39,8 @@ class AnyLoop {
   virtual ~AnyLoop() = default;
   [[nodiscard]] virtual std::unique_ptr<AnyLoop> copy() const = 0;
   virtual double update(double y, double r) = 0;
+  virtual bool elapsed(double seconds) = 0;     ///< false: its steps are of one length
+  virtual double step(double y, double r) = 0;  ///< update, and nothing else
   virtual void hold(double y, double r, double u) = 0;
   virtual void guard(int what) = 0;  ///< pins, trust, b0; of what has guards
   virtual bool retune(double factor_of_bandwidth) = 0;
@@ -92,6 +94,14 @@ class Erased final : public AnyLoop {
     monitor_.look(controller_);
     return u;
   }
+  bool elapsed([[maybe_unused]] double seconds) override {
+    if constexpr (requires { controller_.elapsed(seconds); }) {
+      EXPECT_TRUE(controller_.elapsed(seconds).has_value());
+      return true;
+    }
+    return false;
+  }
+  double step(double y, double r) override { return controller_.update(y, r); }
   void hold(double y, double r, double u) override {
     if constexpr (requires { controller_.hold(y, r, u); }) {
       controller_.hold(y, r, u);
@@ -149,9 +159,10 @@ struct Course {
   double largest = 0;  ///< abs(y)
   std::vector<double> u;
 };
+constexpr double sample_time = 0.0078125;
 using Each = std::function<void(AnyLoop&, int k, double& y)>;
 Course run(AnyLoop& loop, const Each& each, int samples = 2000) {
-  ChainPlant plant(1, 0.0078125, 2, 1.5);
+  ChainPlant plant(1, sample_time, 2, 1.5);
   Course course;
   for (int k = 0; k < samples; ++k) {
     const double out = plant.output();
@@ -183,6 +194,13 @@ void obeys_the_laws(const AnyLoop& fresh) {
       << "a retune to its own settings";
   EXPECT_TRUE(same([](AnyLoop& loop, int k, double&) { EXPECT_TRUE(k != 120 || loop.restore()); }))
       << "a snapshot";
+  EXPECT_TRUE(same([](AnyLoop& loop, int k, double&) {
+    if (k == 120 && loop.elapsed(0)) {
+      const double u = loop.step(70, -7);
+      EXPECT_EQ(loop.step(-80, 8), u);
+      loop.elapsed(sample_time);
+    }
+  })) << "no time";
 
   // What is lost, false, guarded, held and retuned, alone and together, in any order; then it
   // settles.

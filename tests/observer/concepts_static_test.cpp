@@ -457,6 +457,7 @@ static_assert(!LoopObserver<FillUndeclared> && !LoopObserver<FillWithNothing>);
 
 ESOKIT_OBSERVER(Varies, {.varies_time = true}) {
   Check<S> set_step_time(S);
+  esokit::Expected<int, esokit::Error<S>> elapsed(S);
   S step_time() const;
   bool bridges(int) const;
 };
@@ -465,11 +466,18 @@ ESOKIT_OBSERVER(TimeNotSaid, {.varies_time = true}) { Check<S> set_step_time(S);
 ESOKIT_OBSERVER(TimeUndeclared, {}) { Check<S> set_step_time(S); };
 ESOKIT_OBSERVER(TimeTellsNothing, {.varies_time = true}) {
   void set_step_time(S);
+  esokit::Expected<int, esokit::Error<S>> elapsed(S);
   S step_time() const;
   bool bridges(int) const;
 };
 static_assert(LoopObserver<Varies> && !LoopObserver<TimeMissing> && !LoopObserver<TimeNotSaid>);
+ESOKIT_OBSERVER(TimeDoesNotPass, {.varies_time = true}) {
+  Check<S> set_step_time(S);
+  S step_time() const;
+  bool bridges(int) const;
+};
 static_assert(!LoopObserver<TimeUndeclared> && !LoopObserver<TimeTellsNothing>);
+static_assert(!LoopObserver<TimeDoesNotPass>);
 
 ESOKIT_OBSERVER(Gates, {.gates_outliers = true}) { bool accepts(S) const; };
 ESOKIT_OBSERVER(GateMissing, {.gates_outliers = true}){};

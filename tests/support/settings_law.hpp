@@ -143,6 +143,10 @@ void step_observer(O& o, Signals& in, Played& out) {
     if (in.random.index(3) == 0) {
       put(out, o.set_step_time(T * static_cast<S>(lengths[in.random.index(7)])).has_value());
     }
+    if (in.random.index(9) == 0) {
+      const auto steps = o.elapsed(T * static_cast<S>(in.random.uniform(0, 12)));
+      for (int i = 0; i < steps.value_or(0); ++i) put(out, o.predict(in.u<S>()));
+    }
   }
   if constexpr (requires { o.set_trust(T); }) {
     if (what == 1) o.set_trust(static_cast<S>(in.random.uniform(0, 1)));
@@ -223,6 +227,9 @@ void step_controller(C& o, Signals& in, Played& out) {
     if (in.random.index(3) == 0) {
       const S length = o.sample_time() * static_cast<S>(lengths[in.random.index(7)]);
       put(out, o.set_step_time(length).has_value());
+    }
+    if (in.random.index(9) == 0) {
+      put(out, o.elapsed(o.sample_time() * static_cast<S>(in.random.uniform(0, 12))).has_value());
     }
   }
   if constexpr (requires { o.measured(in.u<S>()); }) {

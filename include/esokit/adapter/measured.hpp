@@ -8,6 +8,7 @@
 #include <esokit/model/measured_input.hpp>
 #include <esokit/model/sampled_model.hpp>
 #include <limits>
+#include <type_traits>
 
 namespace esokit {
 
@@ -112,12 +113,13 @@ requires(detail::shifts_load<Observer>()) class Measured
     // The length of the step may be another one than was thought.
     if constexpr (observer_traits<Observer>.varies_time) tell();
     const StepStatus status = observer_.predict(u_applied);
+    const bool later = is_of_a_pause();
     for (int i = 0; i < Count; ++i) {
       const auto at = static_cast<std::size_t>(i);
       paths_[at].advance();
-      paths_[at].push(accepted(at));
+      paths_[at].push(later ? held(at) : accepted(at));
     }
-    forget();
+    if (!later) forget();
     tell();
     return status;
   }
@@ -128,6 +130,7 @@ requires(detail::shifts_load<Observer>()) class Measured
   noexcept {
     if (auto ok = observer_.set_step_time(seconds); !ok) return ok;
     for (auto& path : paths_) path.set_time(seconds);
+    pause_ = {};
     return {};
   }
 
@@ -138,6 +141,7 @@ requires(detail::shifts_load<Observer>()) class Measured
     const auto steps = observer_.elapsed(seconds);
     if (!steps || *steps == 0) return steps;
     for (auto& path : paths_) path.set_time(observer_.step_time());
+    pause_.steps = *steps - 1;
     return steps;
   }
 
@@ -179,6 +183,11 @@ requires(detail::shifts_load<Observer>()) class Measured
 
  private:
   using Settings = MeasuredConfig<Observer, Count>;
+  static constexpr bool varies_time = observer_traits<Observer>.varies_time;
+  struct Pause {
+    int steps = 0;  ///< that come before the one with the present w
+  };
+  struct NoPause {};
 
   Measured(const Observer& observer, const Settings& config) noexcept
       : Base(observer), most_lost_(config.most_lost) {
@@ -220,7 +229,19 @@ requires(detail::shifts_load<Observer>()) class Measured
     } else if (lost_[i] <= 65535) {
       ++lost_[i];
     }
+    return held(i);
+  }
+  /// What is taken for w as long as none is given.
+  [[nodiscard]] S held(std::size_t i) const noexcept {
     return lost_[i] > most_lost_ ? S(0) : last_[i];
+  }
+  /// In a pause the w that is given now has not acted yet.
+  bool is_of_a_pause() noexcept {
+    if constexpr (varies_time) {
+      return pause_.steps > 0 && pause_.steps-- > 0;
+    } else {
+      return false;
+    }
   }
 
   /// A w counts for one step.
@@ -246,6 +267,7 @@ requires(detail::shifts_load<Observer>()) class Measured
   Array<S, Count> last_{};  ///< the last good ones
   Array<int, Count> lost_{};
   int most_lost_;
+  [[no_unique_address]] std::conditional_t<varies_time, Pause, NoPause> pause_{};
   S told_{};  ///< the f that is in the estimate
 };
 

@@ -169,6 +169,15 @@ requires(detail::restarts<Observer>()) class VariableTime
     return observer_.correct(y);
   }
 
+  /// Restarts at (y, 0, .., 0), or at a given estimate, N x 1. Time that was too short for a step
+  /// is over, too.
+  /// @{
+  StepStatus reset(S y) noexcept { return begin(observer_.reset(y)); }
+  StepStatus reset(const typename Observer::Estimate& state) noexcept {
+    return begin(observer_.reset(state));
+  }
+  /// @}
+
   /// True if so much time has passed that the next `correct` restarts the observer.
   [[nodiscard]] bool restarts() const noexcept { return is_too_long() || observer_.restarts(); }
 
@@ -187,6 +196,11 @@ requires(detail::restarts<Observer>()) class VariableTime
         step_time_(chain_config<Observer>(config_.observer).sample_time),
         current_(step_time_),
         longest_(longest) {}
+
+  StepStatus begin(StepStatus status) noexcept {
+    if (status == StepStatus::ok) kept_ = {};
+    return status;
+  }
 
   /// Sets the steps to the nominal length.
   void take(const VariableTime& fresh) noexcept {

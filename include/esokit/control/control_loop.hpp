@@ -309,6 +309,7 @@ class ControlLoop {
       limiter_.track(u);
       requested_ = u;
       elsewhere_ = true;
+      steps_ = {};
       set_mode(LoopMode::running);
     }
     return status;
