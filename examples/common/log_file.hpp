@@ -255,7 +255,7 @@ class TextLines {
 };
 
 /// The wanted columns of a CSV file. Lines that begin with # or % or // are comments. The numbers
-/// begin where a line looks like those further down. Up to three lines directly above it name the
+/// begin where a line looks like those further down. Up to five lines directly above it name the
 /// columns (names, units), or the last comment, or a label before each number (u:1.5, "u: 1.5 V",
 /// u=1.5). Other lines between them are left out. Columns are named by them, by what follows the
 /// last / or . of a name or by its beginning where that is one column's alone, or by their number
@@ -459,7 +459,7 @@ class LogFile {
       if (!headers_.empty() && fields.size() != headers_[0].size()) return false;
       headers_.emplace(headers_.begin(), fields.begin(), fields.end());
       header_line_ = head.number;
-      return headers_.size() < 3;
+      return headers_.size() < 5;
     };
     for (std::size_t i = first; i-- > 0;) {
       const Head& head = heads[text[i]];
@@ -542,6 +542,7 @@ class LogFile {
       while (from < line.size() &&
              (ends.find(line[from]) == std::string_view::npos || in_number(from)))
         ++from;
+      from = with_unit(line, value, from);
       // What is before another label is the name of a part of the program: "motor: u=0.5".
       const std::string_view text = line.substr(value, from - value);
       if (!text.empty() && std::isalpha(static_cast<unsigned char>(text[0])) != 0 &&
@@ -553,6 +554,18 @@ class LogFile {
           {line.substr(begin, end - begin), text, line[i] == '=' || value > i + 1 || end < i});
       i = from > i ? from - 1 : i;
     }
+  }
+
+  /// The end of a number with its unit of time: "t: 100 ms u: 2", but not "t: 100 s: 2".
+  static std::size_t with_unit(std::string_view line, std::size_t value, std::size_t end) {
+    if (end >= line.size() || line[end] != ' ' || !is_number(line.substr(value, end - value)))
+      return end;
+    const std::size_t behind = std::min(line.find_first_of(" \t,;|:=", end + 1), line.size());
+    const std::size_t next = line.find_first_not_of(' ', behind);
+    const std::string_view unit = line.substr(end + 1, behind - end - 1);
+    const bool time = unit == "s" || unit == "ms" || unit == "us" || unit == "min";
+    const bool label = next != std::string_view::npos && (line[next] == ':' || line[next] == '=');
+    return time && !label ? behind : end;
   }
 
   /// The stamp or number of a line before its labels: "12.5 u=1", "[12.5] u=1", "I (1234) motor:

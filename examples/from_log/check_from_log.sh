@@ -398,9 +398,15 @@ sounds b0 plain.csv --b0 500
 sounds b0 plain.csv --b0 0.87
 [[ $said == *"degrees and radians"* ]]
 verdict $? "b0 wrong by 57.3 is not called degrees and radians: $said"
-written t,y,u , '50 * t' >tenths.csv  # 0.1 from row to row: s, or ms at 10 kHz
-refuses "in which unit is the time? Nothing says it of column t, which begins at 0 and rises by 0.1" tenths.csv
+written t,y,u , '50 * t' >tenths.csv  # 0.1 from row to row: s, or min, or ms at 10 kHz
+sounds time-unit tenths.csv
 truth=0.02 healthy tenths.csv --time-unit s
+written t,pos,u , '10 * t' >fifty_hertz.csv  # 0.02 s, or 1.2 s in minutes: not of a position
+truth=0.5 healthy fifty_hertz.csv --order 2
+written t,y,u , '10 * t' >fifty_hertz.csv
+sounds time-unit fifty_hertz.csv
+written t,y,u , 'NR / 30' >minutes.csv  # whole numbers of 2 s, but for the digits
+refuses "in which unit is the time? Nothing says it of column t, which begins at 0" minutes.csv
 written t_s,y,u , '1e6 * t' >called_seconds.csv
 sounds time-unit called_seconds.csv
 truth=5e-11 healthy called_seconds.csv --time-unit s
@@ -675,6 +681,11 @@ table , | awk -F, '{ printf "I (%d) motor: u=%s y=%s\n", 1234 + 1000 * $1, $3, $
 reads esp.txt --time-unit ms
 stamped 'sprintf("2024-02-%d %s", 28 + d, clock())' 'stamp " INFO [main] u=" $3 " y=" $2' | sed 's/\(:[0-9][0-9]\)[.]/\1,/' >logger.txt
 reads logger.txt
+# A number in brackets behind a word is its index, and no time.
+table , | awk -F, '{ printf "motor[%d] u=%s y=%s\n", NR, $3, $2 }' >index.txt
+refuses "which column is time?" index.txt
+table , | awk -F, '{ printf "Time: %d ms\tU: %s Nm\tAngle: %s rad\n", 1000 * $1, $3, $2 }' >units_behind.txt
+reads units_behind.txt
 { echo '['; table , | awk -F, '{ printf "{\"t\":%s,\"y\":%s,\"u\":%s},\n", $1, $2, $3 }' | sed '$ s/,$//'; echo ']'; } >array.json
 reads array.json
 { echo t,y,u; table , | sed 's/-/\xe2\x88\x92/g'; } >typeset_minus.csv
@@ -704,6 +715,17 @@ reads labview.lvm --time X_Value
   table , | awk -F, '{ printf ",,0,%d%09d,%s,%s\n", 1700000000 + int($1), ($1 - int($1)) * 1e9 + 0.5, $2, $3 }'
 } >influx.csv
 reads influx.csv
+{ printf 'time,u,y\n,Nm,rad\n,double,double\n,zoh,linear\n'; table , | awk -F, '{ print $1 "," $3 "," $2 }'; } >inspector.csv
+reads inspector.csv
+{ echo %time,field.header.stamp,field.position0,field.effort0
+  table , | awk -F, '{ printf "%d%09d,9,%s,%s\n", 1700000000 + int($1), ($1 - int($1)) * 1e9 + 0.5, $2, $3 }'; } >echoed.csv
+reads echoed.csv
+{ echo Record,Date,UTC Time,MV,PV; stamped 'sprintf("02/%d/2024,%s", 28 + d, clock())' 'NR "," stamp "," $3 "," $2'; } >datalog.csv
+reads datalog.csv
+{ echo time,_field,_value; echo 1,u,2; echo 1,y,3; echo 2,u,2; } >long.csv
+refuses "this is a long table" long.csv
+{ echo dt,u,y; table , | awk -F, '{ print "0.01," $3 "," $2 }'; } >steps.csv
+refuses "time stands still: column dt is 0.01 in all rows" steps.csv --time dt
 { printf 't/ms;y/rad;u/Nm\n'; table ';' | awk -F';' -v OFS=';' '{ $1 *= 1000 } 1'; } >din.csv
 reads din.csv
 { echo 'Zeit [min],Lage,Kraft'; table , | awk -F, -v OFS=, '{ $1 = sprintf("%.12g", $1 / 60) } 1'; } >minutes.csv

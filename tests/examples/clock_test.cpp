@@ -32,58 +32,190 @@ ClockRead read(const std::vector<double>& stamps) {
   of.whole = true;
   for (const double stamp : stamps)
     of.whole = of.whole && !(stamp < std::floor(stamp)) && !(stamp > std::floor(stamp));
+  of.steady = from_log::is_steady(stamps, of.step);
+  of.rounder = from_log::rounder_unit(stamps);
   return of;
 }
 
-// {s, ms, us, ns, 100 ns, min, day, index} x {1970, 1904, 1900, 0} x rows of 0.1 ms to 1 h: the
-// right unit, or none. A wrong unit with an alarm is counted, too: 1e6 in ms is 1 ms of a counter
-// of ns, which is far more usual than a row in 17 minutes.
+// {s, ms, us, ns, 100 ns, min, h, day, index} x {1970, 1904, 1900, 0, clocks that have run for a
+// while} x rows of 0.1 ms to 1 h: the right unit, or none, or an alarm. One class is left: minutes
+// from zero with rows of less than a second and hours with rows of less than a minute, even in
+// seconds (0.0125 min). They have the numbers of logs in seconds, which nearly all are.
+struct Found {
+  int right = 0, asked = 0, loud = 0, silent = 0;
+};
+struct Unit {
+  const char* name;
+  double seconds;
+  int decimals;
+};
+Found of_rows(const std::vector<double>& apart, const Unit& unit, double begin,
+              const std::string& what) {
+  Found found;
+  for (const double T : apart) {
+    auto stamps = written(begin, unit.seconds, T, 500, unit.decimals);
+    const bool spread = from_log::spread_stamps(stamps).spread;  // sounds an alarm, too
+    if (!(from_log::usual_step(stamps) > 0)) continue;
+    const auto verdict = from_log::judge_clock(read(stamps));
+    if (!verdict.told())
+      ++found.asked;
+    else if (std::abs(verdict.unit / unit.seconds - 1) < 1e-9)
+      ++found.right;
+    else if (verdict.doubtful || spread)
+      ++found.loud;
+    else if (begin == 0 && ((unit.seconds == 60 && T < 1) || (unit.seconds == 3600 && T < 60)))
+      ++found.silent;
+    else
+      ADD_FAILURE() << what << ", rows " << T << " s, is read as " << verdict.unit << " s";
+  }
+  return found;
+}
+
+constexpr double year = 365.2425 * 86400, day = 86400;
+const Unit units[] = {{"s", 1, 4},     {"s", 1, 6},       {"ms", 1e-3, 1},    {"ms", 1e-3, 3},
+                      {"us", 1e-6, 0}, {"ns", 1e-9, 0},   {"100ns", 1e-7, 0}, {"min", 60, 8},
+                      {"h", 3600, 9},  {"day", 86400, 11}};
+
 TEST(Clock, AUnitIsRightOrAskedFor) {
-  const double apart[] = {1e-4, 2e-4, 1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05, 0.1, 0.2,  0.5,  1,   2,
-                          5,    10,   30,   60,   90,   100,  300,  600,  900, 1000, 1800, 3600};
-  struct Unit {
-    const char* name;
-    double seconds;
-    int decimals;
-  };
-  const Unit units[] = {{"s", 1, 4},        {"ms", 1e-3, 1}, {"us", 1e-6, 0},   {"ns", 1e-9, 0},
-                        {"100ns", 1e-7, 0}, {"min", 60, 8},  {"day", 86400, 11}};
-  const double year = 365.2425 * 86400;
-  const std::pair<const char*, double> epochs[] = {
-      {"1970", 54.9 * year}, {"1904", 120.9 * year}, {"1900", 124.9 * year}, {"0", 0}};
+  const std::vector<double> usual = {1e-4, 2e-4, 1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05, 0.1,
+                                     0.2,  0.5,  1,    2,    5,    10,   30,   60,   90,
+                                     100,  300,  600,  900,  1000, 1800, 3600};
+  const std::vector<double> odd = {1.25e-4, 3e-4,  4e-4, 8e-4, 1.5e-3, 2.5e-3, 4e-3, 8e-3, 0.0125,
+                                   0.016,   0.025, 0.03, 0.04, 0.08,   0.125,  0.15, 0.25, 0.3,
+                                   0.4,     0.75,  1.2,  1.5,  2.5,    3,      4,    6,    7.5,
+                                   12,      15,    20,   25,   40,     45,     50,   120,  150,
+                                   180,     240,   450,  720,  1200,   2400,   2700};
+  const std::pair<const char*, double> begins[] = {{"1970, 2001", 31.2 * year},
+                                                   {"1970, 2024", 54.9 * year},
+                                                   {"1904", 120.9 * year},
+                                                   {"1900", 124.9 * year},
+                                                   {"0", 0},
+                                                   {"17.3 s", 17.3},
+                                                   {"1 h", 3600.5},
+                                                   {"3 days", 3 * day + 77},
+                                                   {"40 days", 40 * day + 1.25}};
+  Found all;
   for (const Unit& unit : units) {
-    for (const auto& [epoch, begin] : epochs) {
-      int right = 0, asked = 0, wrong = 0, loud = 0;
-      for (const double T : apart) {
-        auto stamps = written(begin, unit.seconds, T, 2000, unit.decimals);
-        from_log::spread_stamps(stamps);
-        if (!(from_log::usual_step(stamps) > 0)) continue;
-        const auto verdict = from_log::judge_clock(read(stamps));
-        if (!verdict.told())
-          ++asked;
-        else if (std::abs(verdict.unit / unit.seconds - 1) < 1e-9)
-          ++right;
-        else if (verdict.doubtful)
-          loud += T < 1000 ? 1 : 0;
-        else {
-          ++wrong;
-          ADD_FAILURE() << unit.name << " since " << epoch << ", rows " << T << " s, is read as "
-                        << verdict.unit << " s";
-        }
+    for (const auto& [begin, at] : begins) {
+      const std::string what = std::string(unit.name) + " from " + begin;
+      Found found;
+      for (const auto* apart : {&usual, &odd}) {
+        const Found part = of_rows(*apart, unit, at, what);
+        found.right += part.right, found.asked += part.asked;
+        found.loud += part.loud, found.silent += part.silent;
       }
-      std::printf("%5s since %4s: right %2d, asked for %2d, wrong with an alarm %d, wrong %d\n",
-                  unit.name, epoch, right, asked, loud, wrong);
-      const bool started = std::string(epoch) == "0";
-      if (!started) {
-        EXPECT_GE(right, 15) << unit.name << " since " << epoch;
+      all.right += found.right, all.asked += found.asked;
+      all.loud += found.loud, all.silent += found.silent;
+      const bool in_use =
+          from_log::detail::date_of(at / unit.seconds, unit.seconds) > from_log::detail::Date::rare;
+      if (at > year && in_use && unit.seconds < 86399) {
+        EXPECT_GE(found.right, 64) << what;
       }
-      EXPECT_EQ(loud, 0) << unit.name << " since " << epoch;
+      if (at > year) {
+        EXPECT_LE(found.loud, 9) << what;
+      }
     }
   }
+  std::printf("right %d, asked for %d, wrong with an alarm %d, silent %d\n", all.right, all.asked,
+              all.loud, all.silent);
+  EXPECT_LE(all.silent, 5);
+  EXPECT_GE(all.right, 2300);
   for (const double first : {0.0, 1.0}) {
     const auto verdict = from_log::judge_clock(read(written(first, 1, 1, 1000, 0)));
     EXPECT_FALSE(verdict.told()) << "rows that are counted are no time";
   }
+}
+
+// What nearly everybody has: seconds from zero are read, with an alarm where another unit is as
+// even, and without one where rows jitter or the name of y rules the other out.
+TEST(Clock, SecondsFromZeroAreNeverRefused) {
+  using from_log::Pace;
+  for (const double T : {0.001, 0.002, 0.0025, 0.004, 0.005, 0.008, 0.01, 0.0125, 0.02, 0.025, 0.04,
+                         0.05,  0.1,   0.2,    0.25,  0.4,   0.5,   1.5,  2.5,    7.5,  22.5}) {
+    for (const double begin : {0.0, 12.0}) {
+      ClockRead clock = read(written(begin, 1, T, 2000, 4));
+      const auto verdict = from_log::judge_clock(clock);
+      EXPECT_EQ(verdict.unit, 1) << T;
+      EXPECT_EQ(verdict.doubtful, T > 1.0 / 60) << T;
+      clock.pace = Pace::quick;
+      if (T > 0.04 && T < 1) continue;  // 10 kHz in ms
+      EXPECT_EQ(from_log::judge_clock(clock).unit, T < 1 ? 1 : 1e-3) << T;
+      EXPECT_EQ(from_log::judge_clock(clock).doubtful, T > 1) << T;
+    }
+  }
+  std::vector<double> jitter = written(0, 1, 0.1, 2000, 4);
+  for (std::size_t k = 0; k < jitter.size(); ++k) jitter[k] += 0.001 * static_cast<double>(k % 3);
+  EXPECT_FALSE(read(jitter).steady);
+  EXPECT_EQ(from_log::judge_clock(read(jitter)).unit, 1);
+  EXPECT_FALSE(from_log::judge_clock(read(jitter)).doubtful);
+  // A temperature has no kHz, and a speed no minutes.
+  ClockRead clock = read(written(0, 1, 0.7, 2000, 4));
+  EXPECT_FALSE(from_log::judge_clock(clock).doubtful);
+  clock = read(written(0, 1, 0.8, 2000, 4));
+  EXPECT_TRUE(from_log::judge_clock(clock).doubtful);
+  clock.pace = Pace::slow;  // 48 s in minutes is nothing that people set
+  EXPECT_FALSE(from_log::judge_clock(clock).doubtful);
+  clock = read(written(0, 1, 0.02, 2000, 4));
+  EXPECT_TRUE(from_log::judge_clock(clock).doubtful);  // 1.2 s in minutes
+  clock.pace = Pace::quick;
+  EXPECT_FALSE(from_log::judge_clock(clock).doubtful);
+}
+
+// Whole numbers from zero: asked for, unless the name of y leaves one unit, and then with an alarm.
+TEST(Clock, WholeNumbersFromZeroByTheNameOfY) {
+  using from_log::Pace;
+  const auto unit = [](double step, Pace pace) {
+    ClockRead clock = read(written(0, 1, step, 2000, 0));
+    clock.pace = pace;
+    const auto verdict = from_log::judge_clock(clock);
+    EXPECT_EQ(verdict.doubtful, verdict.told());
+    return verdict.unit;
+  };
+  for (const double step : {1, 2, 10, 20, 60, 100, 1000}) EXPECT_EQ(unit(step, Pace::unknown), 0);
+  for (const double step : {2, 10, 50}) EXPECT_EQ(unit(step, Pace::quick), 1e-3) << step;
+  for (const double step : {1, 100, 1000}) EXPECT_EQ(unit(step, Pace::quick), 0) << step;
+  for (const double step : {5, 10, 60}) EXPECT_EQ(unit(step, Pace::slow), 1) << step;
+  for (const double step : {1, 120, 300}) EXPECT_EQ(unit(step, Pace::slow), 0) << step;
+  for (const double step : {250, 1000, 5000}) EXPECT_EQ(unit(step, Pace::slow), 1e-3) << step;
+}
+
+// In minutes, hours or days these have few digits, and in seconds many.
+TEST(Clock, FractionsThatAreRoundInAnotherUnit) {
+  const auto clock = [](double begin, double unit, double T, int decimals) {
+    return from_log::judge_clock(read(written(begin, unit, T, 2000, decimals)));
+  };
+  EXPECT_FALSE(clock(0, 60, 1, 8).told());
+  EXPECT_FALSE(clock(0, 60, 1, 4).told());
+  EXPECT_FALSE(clock(17.3, 60, 0.75, 8).told());  // 0.288333 and steps of 0.0125
+  EXPECT_FALSE(clock(0, 86400, 45, 9).told());
+  EXPECT_FALSE(clock(0, 3600, 2700.5, 9).told());
+  EXPECT_EQ(clock(17.3, 1, 0.0125, 4).unit, 1);
+  // A sketch that divides millis() by 60000: rows jitter by ms.
+  std::vector<double> jitter;
+  for (int k = 0; k < 2000; ++k)
+    jitter.push_back(std::round((k + 0.003 * (k % 5)) / 60 * 1e7) / 1e7);
+  EXPECT_EQ(from_log::rounder_unit(jitter), 60);
+  EXPECT_FALSE(from_log::judge_clock(read(jitter)).told());
+}
+
+// A date that few have is no date where a clock that has run for days is as likely.
+TEST(Clock, CountersOfWeeksAreNoDatesOfOldEpochs) {
+  const double at = 40 * day + 1.25;
+  EXPECT_FALSE(from_log::judge_clock(read(written(at, 1e-6, 0.025, 2000, 0))).told());
+  EXPECT_FALSE(from_log::judge_clock(read(written(at, 1e-9, 0.025, 2000, 0))).told());
+  EXPECT_FALSE(from_log::judge_clock(read(written(at, 60, 0.125, 2000, 8))).told());
+  // Seconds since 1904 of LabVIEW: so, and with an alarm where they may be ms.
+  const auto lab = [](double T, int decimals) {
+    return from_log::judge_clock(read(written(120.9 * year, 1, T, 2000, decimals)));
+  };
+  EXPECT_EQ(lab(0.02, 3).unit, 1);
+  EXPECT_FALSE(lab(0.02, 3).doubtful);
+  EXPECT_TRUE(lab(0.5, 3).doubtful);
+  EXPECT_EQ(lab(0.5, 3).unit, 1);
+  // Three days in seconds may be hours since 1970.
+  const auto days = from_log::judge_clock(read(written(3 * day + 77, 1, 0.02, 2000, 4)));
+  EXPECT_EQ(days.unit, 1);
+  EXPECT_TRUE(days.doubtful);
 }
 
 TEST(Clock, ExamplesByValueAndStep) {

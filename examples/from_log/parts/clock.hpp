@@ -71,6 +71,9 @@ inline std::string time_text(double seconds) {
   return esokit::examples::number_text(seconds / unit, 3) + " " + unit_name(unit);
 }
 
+/// How fast a machine is, by the name of y: a speed or an angle, a temperature or a level.
+enum class Pace { unknown, quick, slow };
+
 /// The numbers of a clock.
 struct ClockRead {
   double first = 0;      ///< as in the file
@@ -78,6 +81,10 @@ struct ClockRead {
   double step = 0;       ///< the usual one from row to row, above 0
   bool whole = false;    ///< all are whole numbers
   bool counter = false;  ///< it began anew: no date
+  bool steady = true;    ///< no jitter: a grid, from which rows may be missing
+  double rounder = 0;    ///< s, of min, h or day: in this unit the numbers have fewer digits
+
+  Pace pace = Pace::unknown;
 };
 
 /// What unit they have.
@@ -103,7 +110,9 @@ inline bool one_of(double value, std::initializer_list<double> all, double near_
 /// A mantissa that people choose.
 inline bool chosen(double seconds) {
   const double mantissa = seconds / std::pow(10.0, std::floor(std::log10(seconds) + 1e-9));
-  return one_of(mantissa, {1, 1.2, 1.5, 1.8, 2, 2.5, 3, 3.6, 5, 6, 9, 10}, 4e-4);
+  return one_of(mantissa,
+                {1, 1.2, 1.5, 1.8, 2, 2.4, 2.5, 2.7, 3, 3.6, 4, 4.5, 5, 6, 7.2, 7.5, 8, 9, 10},
+                4e-4);
 }
 /// Between two rows of a counter.
 inline bool fast(double seconds) {
@@ -118,16 +127,137 @@ inline bool slow(double seconds) {
                 0.004);
 }
 
-/// Whether a clock of this unit shows a year between 1998 and 2040. Since 1970 in seconds also what
-/// counts since 1980 or 2000; days also those of MATLAB, of Julius and modified.
-inline bool is_date(double value, double unit) {
+/// What a clock of this unit shows, if that is a year between 1998 and 2040.
+enum class Date {
+  none,
+  rare,    ///< since a year from which nobody counts in this unit
+  seldom,  ///< in use, but a clock that runs may show the same
+  usual
+};
+inline Date date_of(double value, double unit) {
   const double year = 365.2425 * 86400 / unit;
   const auto since = [&](double epoch) {
     return value > (1998 - epoch) * year && value < (2040 - epoch) * year;
   };
-  if (unit > 86399 && (since(-1) || since(-4713 + 1.0 / 8) || since(1858.88))) return true;
-  if (unit < 1.5 && unit > 0.5 && value > 6e8 && value < 9e8) return true;
-  return since(1970) || since(1904) || since(1900) || since(1601) || since(1);
+  const auto is = [&](double other) { return std::abs(unit / other - 1) < 1e-6; };
+  if (is(86400)) {  // spreadsheets, MATLAB; R, spreadsheets of a Mac, of the year 1
+    if (since(1900) || since(-1)) return Date::usual;
+    if (since(1970) || since(1904) || since(1)) return Date::seldom;
+    if (since(-4713 + 1.0 / 8) || since(1858.88)) return Date::rare;  // Julius, and modified
+  } else if (is(1e-7)) {
+    if (since(1601) || since(1)) return Date::usual;
+  } else if (is(1)) {  // LabVIEW, NTP; since 1980 or 2000
+    if (since(1970)) return Date::usual;
+    if (since(1904) || since(1900) || (value > 6e8 && value < 9e8)) return Date::seldom;
+  } else if (unit < 1 && since(1970)) {
+    return Date::usual;
+  }
+  return since(1970) || since(1904) || since(1900) || since(1601) || since(1) ? Date::rare
+                                                                              : Date::none;
+}
+inline bool is_date(double value, double unit) { return date_of(value, unit) != Date::none; }
+
+/// The largest power of ten of which all values are multiples, to within `off`; 0 below 1e-12.
+inline double grain_of(const std::vector<double>& values, double unit, double off) {
+  for (int place = 3; place > -13; --place) {
+    const double grain = std::pow(10.0, place);
+    if (10 * off > grain) break;
+    if (std::all_of(values.begin(), values.end(), [&](double value) {
+          const double times = value * unit / grain;
+          return std::abs(times - std::round(times)) * grain <=
+                 off + 1e-15 * std::abs(value * unit);
+        }))
+      return grain;
+  }
+  return 0.0;
+}
+
+/// Whether what people log of a machine of this pace is so far apart.
+inline bool usual_rows(double T, Pace pace) {
+  if (pace == Pace::quick) return T > 0.99e-4 && T < 1.01;
+  return T > 0.09 && (T < 60.5 || (slow(T) && T < 3601));
+}
+
+/// Whether a clock of fractions from zero may have this unit, and not seconds.
+inline bool rival(const ClockRead& read, double unit) {
+  const double T = read.step * unit;
+  if (!read.steady || !chosen(T)) return false;
+  if (unit < 0.5) return read.pace != Pace::slow && unit > 0.5e-3 && T > 0.49e-4 && T < 1;
+  // Minutes count what is a second apart, hours and days a minute.
+  const double least = unit > 3599 ? 60 : 1;
+  return read.pace != Pace::quick && unit > 1.5 && T > 0.99 * least;
+}
+
+}  // namespace detail
+
+/// The unit in which the numbers have far fewer digits than as they stand: 0.016667, 0.033333 are
+/// 1 and 2 s in minutes, 0.28833 and 0.30083 are 17.3 and 18.05 s. 0: none.
+inline double rounder_unit(const std::vector<double>& values) {
+  const double as_written = detail::grain_of(values, 1.0, 0.0);
+  const double digit = as_written > 0 ? as_written : 1e-12;
+  for (const double unit : {60.0, 3600.0, 86400.0}) {
+    if (detail::grain_of(values, unit, 0.51 * digit * unit) > 99 * digit) return unit;
+  }
+  return 0.0;
+}
+
+/// Whether stamps lie on a grid, from which some may be missing.
+inline bool is_steady(const std::vector<double>& stamps, double step) {
+  std::size_t off = 0;
+  for (std::size_t k = 1; k < stamps.size(); ++k) {
+    const double steps = (stamps[k] - stamps[k - 1]) / step;
+    off += std::abs(steps - std::round(steps)) > 0.004 ? 1U : 0U;
+  }
+  return 20 * off < stamps.size();
+}
+
+namespace detail {
+
+/// Fractions from zero. Most logs count seconds so; an alarm where another unit is as even.
+inline ClockVerdict judge_fractions(const ClockRead& read, const std::vector<double>& clocks,
+                                    ClockVerdict found) {
+  const auto any = [&](auto&& is) { return std::any_of(clocks.begin(), clocks.end(), is); };
+  const bool seconds = any([](double unit) { return unit > 0.5 && unit < 1.5; });
+  if (!seconds || read.step > 60.5 || read.step < 0.45e-4 || read.rounder > 0) return found;
+  const bool even = three_digits(read.step) || chosen(read.step);
+  if (!even && any([&](double unit) { return unit > 1.5 && chosen(read.step * unit); }))
+    return found;
+  found.unit = 1;
+  found.doubtful = any([&](double unit) { return rival(read, unit); });
+  // From 1 on these are as often ms of a clock of us: 1.003, 2.006 of a sketch.
+  found.doubtful = found.doubtful || read.step > 0.9995;
+  if (read.step < 0.9995 || read.pace == Pace::slow) return found;
+  if (read.pace == Pace::unknown && read.steady && even) return found;
+  found.unit = read.pace == Pace::quick && usual_rows(read.step * 1e-3, read.pace) ? 1e-3 : 0;
+  found.doubtful = found.told();
+  return found;
+}
+
+/// Whole numbers: they may be rows, or have any unit; with an alarm where one is usual.
+inline ClockVerdict judge_counter(const ClockRead& read, const std::vector<double>& clocks,
+                                  ClockVerdict found) {
+  // Of a large number one unit may be some minutes, and the others weeks. (A clock of 100 ns is one
+  // with a date.)
+  std::vector<double> hours, usual;
+  bool weeks = true;
+  for (const double unit : clocks) {
+    if (unit > 0.9e-7 && unit < 1.1e-7) continue;
+    if (read.last * unit < 2 * 86400)
+      hours.push_back(unit);
+    else
+      weeks = weeks && read.first * unit > 7 * 86400;
+    if (unit < 1.5 && usual_rows(read.step * unit, read.pace)) usual.push_back(unit);
+  }
+  const auto take = [&](double unit) {
+    found.unit = unit;
+    found.doubtful = true;
+    return found;
+  };
+  if (hours.size() == 1 && weeks && fast(read.step * hours[0]) && read.step * hours[0] > 0.45e-3)
+    return take(hours[0]);
+  const bool rows = std::abs(read.step - 1) < 0.01 || read.first < -0.5;
+  if (read.pace == Pace::unknown || rows || usual.size() != 1) return found;
+  return read.last * usual[0] < 2 * 86400 ? take(usual[0]) : found;
 }
 
 }  // namespace detail
@@ -158,52 +288,29 @@ inline ClockVerdict judge_clock(const ClockRead& read) {
     found.doubtful = doubtful;
     return found;
   };
-  const auto any_fast = [&] {
-    return std::any_of(clocks.begin(), clocks.end(), [&](double c) { return fast(read.step * c); });
-  };
+  const auto any = [&](auto&& is) { return std::any_of(clocks.begin(), clocks.end(), is); };
+  const auto any_fast = [&] { return any([&](double c) { return fast(read.step * c); }); };
   if (dates.size() > 1) return found;
   if (dates.size() == 1) {
     const double unit = dates[0], T = read.step * unit;
+    const Date date = date_of(read.first, unit);
+    const bool runs = any([&](double c) { return read.step * c > 0.99e-4; });
+    // Seconds of three days may be hours since 1970, which nobody counts.
+    const bool started = date == Date::rare && runs;
+    if (started && (read.whole || !(read.last < 30 * 86400))) return found;
     // Minutes and days since a date are numbers that a clock in s or ms has within hours.
     const bool small_number = unit > 1.5;
-    const bool another = small_number
-                             ? read.whole || (read.step >= shortest && three_digits(read.step))
-                             : !clocks.empty() && T > 60.5;
-    if (!another) return take(unit, true, false);
-    if (small_number || slow(T) == any_fast()) return found;
-    if (slow(T)) return take(unit, true, false);
+    const bool another =
+        small_number ? read.whole || !slow(T) || (read.step >= shortest && three_digits(read.step))
+                     : !clocks.empty() && T > 60.5;
+    if (!another && !started) return take(unit, true, date == Date::seldom && runs);
+    if (!started && (small_number || slow(T) == any_fast())) return found;
+    if (!started && slow(T)) return take(unit, true, date == Date::seldom);
   }
-  // A clock that was started. Most logs count seconds from zero, with a point; whole numbers may be
-  // rows, or have any unit.
-  if (!read.whole) {
-    const bool seconds = std::find(clocks.begin(), clocks.end(), 1.0) != clocks.end();
-    const auto of = [&](double unit) {
-      return read.step * unit <= longest && chosen(read.step * unit);
-    };
-    if (!seconds || read.step > 60) return found;
-    if (!three_digits(read.step) && !chosen(read.step) && (of(60) || of(3600) || of(86400)))
-      return found;
-    // Milliseconds with decimals are as likely above a twentieth where they are a whole number of
-    // kHz, and from one on.
-    const double kilohertz = 1.0 / read.step;
-    const bool whole_kilohertz =
-        read.step > 0.049 && std::abs(kilohertz - std::round(kilohertz)) < 1e-4 * kilohertz;
-    if (whole_kilohertz || read.step >= 1.0) return found;
-    return take(1.0, false, false);
-  }
-  // Of a large number one unit may be some minutes, and the others weeks. (A clock of 100 ns is one
-  // with a date.)
-  std::vector<double> hours;
-  bool weeks = true;
-  for (const double unit : clocks) {
-    if (unit > 0.9e-7 && unit < 1.1e-7) continue;
-    if (read.last * unit < 2 * 86400)
-      hours.push_back(unit);
-    else
-      weeks = weeks && read.first * unit > 7 * 86400;
-  }
-  if (hours.size() == 1 && weeks && fast(read.step * hours[0]) && read.step * hours[0] > 0.45e-3)
-    return take(hours[0], false, true);
+  const bool dated = !dates.empty();
+  found = read.whole ? judge_counter(read, clocks, std::move(found))
+                     : judge_fractions(read, clocks, std::move(found));
+  found.doubtful = found.doubtful || dated;
   return found;
 }
 

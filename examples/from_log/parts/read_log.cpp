@@ -85,10 +85,12 @@ std::vector<std::string> words(const std::string& name) {
 struct Usual {
   const char* words;  ///< between blanks
   char column;        ///< t, u or y
+  Pace pace = Pace::unknown;
   bool first_order = false;
 };
 constexpr Usual usual_names[] = {
-    {" t time stamp timestamp datetime times secs sec seconds clock ticks millis micros uptime "
+    {" t time stamp timestamp datetime times secs sec second seconds clock ticks millis micros "
+     "uptime "
      "elapsed ",
      't'},
     {" x_value zeit uhrzeit zeitstempel temps heure horodatage tiempo hora tempo ", 't'},
@@ -100,24 +102,31 @@ constexpr Usual usual_names[] = {
      "commande entr\xc3\xa9"
      "e chauffage voltaje tensi\xc3\xb3n corriente par entrada tensione corrente coppia ",
      'u'},
-    {" y position pos angle theta measurement meas measured height phi distance odometer pv "
-     "process actual feedback ",
+    {" y measurement meas measured height distance pv process actual feedback ausgang messwert "
+     "istwert sortie salida uscita ",
      'y'},
-    {" winkel lage weg ausgang messwert istwert sortie posicion posici\xc3\xb3n \xc3\xa1ngulo "
-     "angulo salida posizione angolo uscita ",
-     'y'},
-    {" temperature temp speed velocity vel rate level rpm t1 gyro ", 'y', true},
-    {" drehzahl geschwindigkeit temperatur f\xc3\xbcllstand fuellstand pegel vitesse temp\xc3\xa9"
-     "rature niveau velocidad temperatura nivel velocit\xc3\xa0 livello ",
-     'y', true}};
+    {" position pos angle theta phi odometer winkel lage weg posicion posici\xc3\xb3n "
+     "\xc3\xa1ngulo "
+     "angulo posizione angolo ",
+     'y', Pace::quick},
+    {" speed velocity vel rate rpm gyro drehzahl geschwindigkeit vitesse velocidad "
+     "velocit\xc3\xa0 ",
+     'y', Pace::quick, true},
+    {" temperature temp level t1 temperatur f\xc3\xbcllstand fuellstand pegel temp\xc3\xa9"
+     "rature niveau temperatura nivel livello ",
+     'y', Pace::slow, true}};
 
-const Usual* usual_word(const std::string& word) {
+/// Also with a number behind it: velocity0.
+const Usual* usual_word(std::string word) {
   const std::string blank = " " + word + " ";
   for (const Usual& line : usual_names) {
     if (!word.empty() && std::string_view(line.words).find(blank) != std::string_view::npos)
       return &line;
   }
-  return nullptr;
+  const std::size_t length = word.find_last_not_of("0123456789") + 1;
+  if (length < 3 || length == word.size()) return nullptr;
+  word.resize(length);
+  return usual_word(word);
 }
 
 /// What is wanted is neither u nor y: target_speed, T_set, SP, Sollwert.
@@ -147,7 +156,13 @@ const Usual* usual(const std::string& name) {
     const Usual* found = usual_word(*part);
     if (found != nullptr && found->column != 't') return found;
   }
-  return nullptr;
+  return parts.back() == "time" ? last : nullptr;  // UTC time
+}
+
+/// Whether a column of this name says whose value a row has: of InfluxDB, Home Assistant, WinCC.
+bool long_table(const std::string& name) {
+  const std::string_view names = " _field entity_id varname tagname tag topic signal metric ";
+  return names.find(" " + lower(name) + " ") != names.npos;
 }
 
 /// The only column whose name is usual for it, of those that are not `taken` by a name; of several
@@ -185,6 +200,14 @@ std::string guess(const LogFile& file, const char* option, const std::string& gi
     there = "it may be ";
     for (const std::size_t i : fits) there += (i == fits[0] ? "" : ", ") + names[i];
     break;
+  }
+  for (const auto& names : file.headers()) {
+    for (const std::string& name : names) {
+      if (!long_table(name)) continue;
+      throw LogError("this is a long table: a row has one value, and '" + name +
+                     "' says of what. Write a row for each time, and a column for each value (in "
+                     "pandas: pivot)");
+    }
   }
   std::string known;
   for (const std::string& name : taken) {
@@ -697,16 +720,24 @@ Input read_log(const Settings& settings) {
   input.merged = topics();
   mend_stamps(settings, file, input, stamps);
   const double origin = file.stamps().origin();
+  std::vector<double> numbers = stamps;
+  for (double& number : numbers) number += origin;
   ClockRead clock{.first = origin,
-                  .last = origin + stamps.back(),
+                  .last = numbers.back(),
                   .step = usual_step(stamps),
-                  .whole = std::all_of(stamps.begin(), stamps.end(),
-                                       [&](double stamp) {
-                                         const double at = origin + stamp;
-                                         return !(at < std::floor(at)) && !(at > std::floor(at));
-                                       }),
-                  .counter = input.counter};
-  if (!(clock.step > 0.0)) throw LogError(settings.file + ": the log has only one sample");
+                  .whole = detail::grain_of(numbers, 1.0, 0.0) >= 1.0,
+                  .counter = input.counter,
+                  .pace = kind == nullptr ? Pace::unknown : kind->pace};
+  clock.steady = is_steady(stamps, clock.step);
+  if (!clock.whole) clock.rounder = rounder_unit(numbers);
+  if (!(clock.step > 0.0) && stamps.size() < 2)
+    throw LogError(settings.file + ": the log has only one sample");
+  if (!(clock.step > 0.0)) {
+    throw LogError(settings.file + ": time stands still: column " + input.time + " is " +
+                   number_text(origin, 10) +
+                   " in all rows. If that is the time from row to row, set it instead: "
+                   "--sample-time SECONDS");
+  }
   // Dates and times of day are read in seconds.
   const double unit = file.stamps().numbers() ? find_unit(settings, file, clock, input) : 1.0;
   input.time_unit = settings.sample_time > 0.0 ? "rows" : unit_name(unit);
