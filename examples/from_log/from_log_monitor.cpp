@@ -162,11 +162,14 @@ All hours(std::uint64_t seed) {
   const from_log::Watch watch = from_log::watch_of(*tuning, design, rows);
   const auto profile = from_log::Runner::profile_of(pasting, tuning->model,
                                                     static_cast<int>(design.settings.gains.size()));
-  const auto made =
-      esokit::with_controller<Order>(tuning->model, design, [&](const auto& controller) {
-        for (std::size_t i = 0; i < faults.size(); ++i)
-          all[i] = hour(controller, profile, plant, watch, faults[i], random);
-      });
+  // As pasted: the law may ask for what is added to it, too.
+  esokit::TuneModel wide = tuning->model;
+  wide.u_min -= pasting.reach();
+  wide.u_max += pasting.reach();
+  const auto made = esokit::with_controller<Order>(wide, design, [&](const auto& controller) {
+    for (std::size_t i = 0; i < faults.size(); ++i)
+      all[i] = hour(controller, profile, plant, watch, faults[i], random);
+  });
   if (!made) return {};
   return all;
 }

@@ -371,6 +371,58 @@ TEST(Health, CountsWhatHappened) {
   EXPECT_GT(monitor.health().saturated, 0.8);
 }
 
+/// y' = b u - a y + load, or the same of y'' (order 2), driven by a u that stands at a limit.
+template <int Order, class S>
+LoopFault at_a_limit(double b, double r, double load, double seconds) {
+  constexpr double T = 0.05;
+  const bool up = (r > 0) == (b > 0);
+  auto loop = Adrc<LinearEso<Order, S>>::make(
+                  {.observer = {.observer_bandwidth = S(2),
+                                .input_gain = static_cast<S>(b),
+                                .sample_time = static_cast<S>(T)},
+                   .controller_bandwidth = S(0.5),
+                   .limits = {.lower = S(up ? -1 : -0.1), .upper = S(up ? 0.1 : 1)}})
+                  .value();
+  auto monitor = HealthMonitor<Order + 1, S>::make({.observer_bandwidth = S(2),
+                                                    .sample_time = static_cast<S>(T),
+                                                    .input_range = S(0.55),
+                                                    .noise = S(0.01),
+                                                    .memory = S(40)})
+                     .value();
+  ChainPlant plant(Order, T, b, 0.005);
+  Random random(7);
+  for (int k = 0; k * T < seconds; ++k) {
+    const auto y = static_cast<S>(plant.output() + 0.01 * random.uniform(-1.7, 1.7));
+    plant.set_disturbance(load * b);
+    plant.step(static_cast<double>(loop.update(y, static_cast<S>(r))));
+    monitor.look(loop);
+  }
+  EXPECT_GT(monitor.health().saturated, S(0.6)) << b << ' ' << r;
+  return diagnose(monitor.health());
+}
+
+template <int Order, class S>
+void on_its_way_is_no_fault() {
+  const double far = Order == 1 ? 20 : 500;
+  for (const double b : {1.0, -1.0}) {
+    for (const double r : {far, -far}) {
+      const double drives = r > 0 ? 1 : -1;
+      const double against = b > 0 ? -drives : drives;
+      EXPECT_EQ((at_a_limit<Order, S>(b, r, 0, 80)), LoopFault::none) << b << ' ' << r;
+      // The same, held where it is by a load as large, and driven back by a larger.
+      EXPECT_EQ((at_a_limit<Order, S>(b, r, 0.1 * against, 400)), LoopFault::saturated) << b << r;
+      EXPECT_EQ((at_a_limit<Order, S>(b, r, 0.15 * against, 400)), LoopFault::saturated) << b << r;
+    }
+  }
+}
+
+TEST(Health, OnItsWayIsNoFault) {
+  on_its_way_is_no_fault<1, double>();
+  on_its_way_is_no_fault<2, double>();
+  on_its_way_is_no_fault<1, float>();
+  on_its_way_is_no_fault<2, float>();
+}
+
 /// An absurd sample is forgotten, not averaged: what comes after it tells the truth at once.
 TEST(Health, AnAbsurdSampleIsNotRemembered) {
   auto loop = loop_of<float>(20);

@@ -40,6 +40,7 @@ void both_look(const loop_state *o, health_state *h, double y)
   s.asked = o->u_asked;
   s.held = o->u_last;
   s.applied = o->u_applied;
+  s.estimate = loop_estimate(o, 0u);
   s.disturbance = loop_estimate(o, ORDER);
   s.measured = (REAL)y;
   s.missed = o->gap;
@@ -53,7 +54,7 @@ void both_look(const loop_state *o, health_state *h, double y)
 template <class V>
 struct Found {
   std::uint32_t samples, rejected, bridged, unsafe;
-  V lost, saturated, side, innovation, gain_ratio, sign_ratio, response, evidence, opposed;
+  V lost, saturated, side, underway, innovation, gain_ratio, sign_ratio, response, evidence, opposed;
   V steady, standing;
   bool reversed;
 };
@@ -140,6 +141,7 @@ std::array<int, 9> watches(double plant_gain, double bad, std::uint64_t seed, do
     EXPECT_EQ(of_cpp.reversed, of_c.reversed) << k;
     EXPECT_TRUE(equal_bits(of_cpp.saturated, of_c.saturated)) << k;
     EXPECT_TRUE(equal_bits(of_cpp.side, of_c.side)) << k;
+    EXPECT_TRUE(equal_bits(of_cpp.underway, of_c.underway)) << k;
     EXPECT_TRUE(equal_bits(of_cpp.innovation, of_c.innovation)) << k;
     EXPECT_TRUE(equal_bits(of_cpp.gain_ratio, of_c.gain_ratio)) << k;
     EXPECT_TRUE(equal_bits(of_cpp.response, of_c.response)) << k;
@@ -200,8 +202,9 @@ void diagnoses_alike(std::uint64_t seed) {
     health.sign_ratio = about({-0.25, 0, 1});
     health.opposed = about({4});
     health.steady = about({40});
-    health.saturated = about({0.05, 0.5});
+    health.saturated = about({0.05, 0.5, 0.7});
     health.side = static_cast<V>(about({0.8}) * health.saturated);
+    health.underway = about({0, 0.1, 0.5, static_cast<double>(health.saturated) - 0.5});
     health.lost = about({0.1, 0});
     health.standing = about({0.99, 0});
     health.innovation = about({3 * static_cast<double>(health.innovation_of_noise)});
@@ -213,6 +216,7 @@ void diagnoses_alike(std::uint64_t seed) {
                          health.lost,
                          health.saturated,
                          health.side,
+                         health.underway,
                          health.innovation,
                          health.gain_ratio,
                          health.sign_ratio,

@@ -539,7 +539,7 @@ void monitors_in_text(double plant_gain, double bad, LoopFault fault, std::uint6
   const auto health = to_structured_text(watch, controller).value();
   Samples of_loop("y no_y r : u innovation asked applied missed");
   Samples of_health(
-      "innovation asked held applied measured disturbance missed its_status mode : fault "
+      "innovation asked held applied measured estimate disturbance missed its_status mode : fault "
       "gain_ratio "
       "response "
       "saturated");
@@ -564,7 +564,8 @@ void monitors_in_text(double plant_gain, double bad, LoopFault fault, std::uint6
     of_loop.number(y).count(0).number(r).number(values[2]).number(values[0]).number(values[1]);
     of_loop.number(values[3]).count(missed).word("\n");
     for (const V value : values) of_health.number(value);
-    of_health.number(y).number(observer.template estimate<C::order>()).count(missed);
+    of_health.number(y).number(observer.template estimate<0>());
+    of_health.number(observer.template estimate<C::order>()).count(missed);
     of_health.count(static_cast<unsigned>(controller.status()));
     of_health.count(static_cast<unsigned>(controller.mode()));
     const auto& seen = watch.health();

@@ -42,6 +42,8 @@ struct Health {
   S saturated{};               ///< share of samples at a limit, of magnitude or rate
   S side{};                    ///< share of samples at the upper limit, minus that at the lower
   S bounded{};                 ///< share of samples with dhat at its bound, see Guarded
+  S underway{};                ///< share of samples at a limit while y moves where u there drives
+                               ///< it, minus that while y moves back
   S innovation{};              ///< rms, unit of y
   S innovation_of_noise{};     ///< rms that the noise alone would cause; 0 if unknown
   S gain_ratio = 1;            ///< rho: estimate of b / b0, see HealthMonitor
@@ -63,7 +65,7 @@ enum class LoopFault : unsigned char {
   wrong_sign,      ///< b0 has the wrong sign
   gain_too_small,  ///< b0 is several times too small: the loop gain is too large by that factor
   measurements_rejected,  ///< more than a tenth of the measurements are not finite or outliers
-  saturated,              ///< u is at its limits more than half of the time
+  saturated,              ///< u is at its limits more than half of the time, and y is not on its way
   bounded,                ///< dhat is at its bound more than half of the time
   innovation_too_large,   ///< rms above three times that caused by the noise
   gain_too_large_or_disturbed,  ///< the effect of u is cancelled: b0 is too large, or a load drives
@@ -135,7 +137,9 @@ template <PlainScalar S>
   if (static_cast<double>(health.standing) > 0.99 && (saturated > 0.5 || told)) {
     return LoopFault::sensor_still;
   }
-  if (health.saturated > S(1) / S(2)) return LoopFault::saturated;
+  // What y has moved towards is reached: a heater that cools down, an axis on a long way.
+  const S stuck = health.underway > S(0) ? health.saturated - health.underway : health.saturated;
+  if (stuck > S(1) / S(2)) return LoopFault::saturated;
   if (health.bounded > S(1) / S(2)) return LoopFault::bounded;
   if (health.innovation_of_noise > S(0) && health.innovation > S(3) * health.innovation_of_noise) {
     return LoopFault::innovation_too_large;
@@ -193,6 +197,10 @@ requires(model_traits<Model>.tells_constant) inline constexpr int simulated_lag<
 /// 3 / omega_o attenuates y^(n) to a third and delays it by 70 degrees. `response`, the ratio of
 /// the rms of y^(n) and phi, both high-passed, does not depend on that delay. A load raises it,
 /// too: it tells of b0 only in a loop that moves u between both limits.
+///
+/// u at a limit is no fault while y moves where u drives it there: a heater that cools down by itself
+/// at u = 0, an axis on a long way. `underway` is the share of that. Where y stands, or moves the
+/// other way, `saturated` is named.
 ///
 /// With a model (ModelEso) psi is d only, and with an actuator's lag phi is b0 v, from the
 /// simulated output of the actuator.
@@ -295,7 +303,9 @@ requires(detail::is_a_plain_scalar<S>()) class HealthMonitor {
     const S hair = static_cast<S>(1e-4) * range_;
     const int above = beyond > hair ? 1 : 0;
     const int below = beyond < -hair ? 1 : 0;
-    count(status, rejected, runs, gated, bounded, runs ? above - below : 0);
+    const int limit = runs ? above - below : 0;
+    count(status, rejected, runs, gated, bounded, limit);
+    follow(observer.template estimate<0>(), b < S(0) ? -limit : limit);
     if (observer.missed() == 0 && !rejected) average(innovation);
     lost_ = lost_ || rejected;
     free_ = free_ && runs && !gated;
@@ -403,6 +413,19 @@ requires(detail::is_a_plain_scalar<S>()) class HealthMonitor {
     share(health_.bounded, bounded ? 1 : 0);
   }
 
+  /// Whether y moves where u at a limit drives it, by its mean over an eighth of `memory`: as its sign,
+  /// so that noise has none. @param drives sign of b0 u there, or 0
+  void follow(const S& y, int drives) noexcept {
+    S moved = y - slow_y_;
+    if (!is_finite(moved)) {
+      slow_y_ = y;
+      moved = S(0);
+    }
+    slow_y_ = nearer(slow_y_, y, quick_weight());
+    const int way = moved > S(0) ? drives : moved < S(0) ? -drives : 0;
+    health_.underway = nearer(health_.underway, static_cast<S>(way), weight_);
+  }
+
   static constexpr S nearer(const S& share, const S& now, const S& weight) noexcept {
     return share + weight * (now - share);
   }
@@ -412,6 +435,8 @@ requires(detail::is_a_plain_scalar<S>()) class HealthMonitor {
     constexpr S most = S(1) / S(100);
     return weight_ < most ? weight_ : most;
   }
+
+  [[nodiscard]] constexpr S quick_weight() const noexcept { return S(8) * weight_; }
 
   void remember_sign() noexcept {
     constexpr HealthLimits limits{};
@@ -557,7 +582,8 @@ requires(detail::is_a_plain_scalar<S>()) class HealthMonitor {
   bool lost_ = false;  ///< a measurement since the last sum
   bool free_ = true;   ///< the law determined u since then, and no guard dhat
   S mean_square_{};
-  S last_ = std::numeric_limits<S>::quiet_NaN();  ///< measurement
+  S last_ = std::numeric_limits<S>::quiet_NaN();    ///< measurement
+  S slow_y_ = std::numeric_limits<S>::quiet_NaN();  ///< mean of its estimate
   Health<S> health_{};
 };
 

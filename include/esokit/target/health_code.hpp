@@ -70,6 +70,7 @@ requires std::same_as<S, typename Controller::scalar_type> Expected<CCode, Error
   number("SAMPLE_TIME", controller.observer().sample_time());
   number("WEIGHT", settings.weight);
   number("RARE_WEIGHT", settings.rare_weight);
+  number("QUICK_WEIGHT", settings.quick_weight);
   number("HAIR", settings.hair);
   number("LARGEST_SQUARE", settings.largest_square);
   number("LARGEST", S(1000) * settings.range);
@@ -88,6 +89,7 @@ requires std::same_as<S, typename Controller::scalar_type> Expected<CCode, Error
   number("STEP", settings.step);
   number("FORGET", settings.forget);
   number("INPUT_GAIN", settings.input_gain);
+  number("SIGN_OF_GAIN", settings.input_gain < S(0) ? S(-1) : S(1));
   number("NOISE", settings.of_noise);
   number("THRICE_NOISE", S(3) * settings.of_noise);
   const HealthLimits limits;
@@ -143,6 +145,7 @@ to_structured_text(const HealthMonitor<Size, S>& monitor, const Controller& cont
   of_sample("held", "its u");
   of_sample("applied", "such an output");
   of_sample("measured", "y, as given to the controller's block");
+  of_sample("estimate", "its e0");
   of_sample("disturbance", ("its e" + std::to_string(Controller::order)).c_str());
   block.input("missed : UINT", "such an output");
   block.input("its_status : UINT", "its status");
@@ -155,7 +158,7 @@ to_structured_text(const HealthMonitor<Size, S>& monitor, const Controller& cont
   block.output(
       "fault : UINT",
       "0: none, 1: the sign of b0 is wrong, 2: b0 is several times too small, 3: more than "
-      "a tenth of y are rejected, 4: u is at a limit more than half of the time, 6: the "
+      "a tenth of y are rejected, 4: u is at a limit more than half of the time and y not on its way, 6: the "
       "innovation is three times that of the noise, 7: b0 is too large, or a load drives "
       "u, 8: the sensor stands still");
   for (const char* name : {"gain_ratio", "response", "saturated"}) {

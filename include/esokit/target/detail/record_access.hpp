@@ -606,7 +606,7 @@ struct RecordAccess {
   static auto health(const M& m, const C& c) noexcept {
     using S = typename M::scalar_type;
     struct Numbers {
-      S weight, rare_weight, large_move, hair, largest_square, range, pole, slow, middle,
+      S weight, rare_weight, quick_weight, large_move, hair, largest_square, range, pole, slow, middle,
           least_against, least, step, forget;
       S input_gain, of_noise;
       int divider;
@@ -615,6 +615,7 @@ struct RecordAccess {
     numbers.range = absolute(b) * m.range_;
     numbers.weight = m.weight_;
     numbers.rare_weight = m.rare_weight();
+    numbers.quick_weight = m.quick_weight();
     numbers.large_move = m.large_move * numbers.range;
     numbers.hair = static_cast<S>(1e-4) * m.range_;
     numbers.largest_square = m.largest_square();

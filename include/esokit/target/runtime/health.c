@@ -23,6 +23,26 @@ static uint32_t counted(uint32_t many, bool now)
   return next;
 }
 
+/* Whether y moves where u at a limit drives it. */
+static void follow(esokit_state *o, real y, real drives)
+{
+  real moved = y - o->slow_y;
+  real way = 0.0;
+  if (!(o->has_mean && is_finite(moved))) {
+    o->slow_y = y;
+    o->has_mean = true;
+    moved = 0.0;
+  }
+  o->slow_y = nearer(o->slow_y, y, QUICK_WEIGHT);
+  if (moved > 0.0) {
+    way = drives;
+  }
+  if (moved < 0.0) {
+    way = -drives;
+  }
+  o->underway = nearer(o->underway, way, WEIGHT);
+}
+
 static void count(esokit_state *o, const esokit_sample *sample, bool rejected)
 {
   const real beyond = sample->asked - sample->held;
@@ -44,6 +64,7 @@ static void count(esokit_state *o, const esokit_sample *sample, bool rejected)
   o->lost = nearer(o->lost, gone, RARE_WEIGHT);
   o->saturated = nearer(o->saturated, fabs(limit), WEIGHT);
   o->side = nearer(o->side, limit, WEIGHT);
+  follow(o, sample->estimate, SIGN_OF_GAIN * limit);
 }
 
 /* Whether y stands still. */
@@ -277,7 +298,11 @@ unsigned esokit_diagnose(const esokit_state *o)
   const double limit = ONE_SIDE * saturated;
   const bool swings = (saturated > OFTEN_LIMITED) && (side < limit) && (side > -limit);
   const bool told = evidence >= FOR_EVIDENCE;
+  real stuck = o->saturated;
   unsigned fault = ESOKIT_NONE;
+  if (o->underway > 0.0) {
+    stuck = o->saturated - o->underway;
+  }
   if (o->reversed || sees_wrong_sign(o)) {
     fault = ESOKIT_WRONG_SIGN;
   } else if (told && ((rho > FOR_TOO_SMALL) ||
@@ -287,7 +312,7 @@ unsigned esokit_diagnose(const esokit_state *o)
     fault = ESOKIT_MEASUREMENTS_REJECTED;
   } else if (((double)o->standing > FOR_STANDING) && ((o->saturated > 0.5) || told)) {
     fault = ESOKIT_SENSOR_STILL;
-  } else if (o->saturated > 0.5) {
+  } else if (stuck > 0.5) {
     fault = ESOKIT_SATURATED;
   } else if ((NOISE > 0.0) && (o->innovation > THRICE_NOISE)) {
     fault = ESOKIT_INNOVATION_TOO_LARGE;

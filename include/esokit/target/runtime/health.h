@@ -20,6 +20,7 @@ typedef struct {
   real asked;       /* o.u_asked */
   real held;        /* o.u_last */
   real applied;     /* o.u_applied */
+  real estimate;    /* its estimate number 0 */
   real disturbance; /* its estimate number DESIGN_ROW */
   real measured;    /* y, as given to its update; not a number: the sensor is not watched */
   uint32_t missed;   /* o.gap */
@@ -35,6 +36,7 @@ typedef struct {
   real lost;        /* share of measurements that were rejected */
   real saturated;   /* share of samples at a limit; about those of the last DESIGN_MEMORY samples */
   real side;        /* those at the upper one, minus those at the lower */
+  real underway;    /* share at a limit while y moves where u there drives it, minus while back */
   real innovation;  /* rms, unit of y */
   real gain_ratio;  /* estimate of the true b0 over that of the design */
   real sign_ratio;  /* the same, from large moves of u only */
@@ -60,8 +62,10 @@ typedef struct {
   real y;
   real mean_square;
   real last;
+  real slow_y;
   uint16_t phase;
   bool has_last;
+  bool has_mean;
   bool is_lost;
   bool is_free;
 } esokit_state;
@@ -71,7 +75,7 @@ typedef struct {
 #define ESOKIT_WRONG_SIGN 1u /* of b0 */
 #define ESOKIT_GAIN_TOO_SMALL 2u /* b0 is several times too small */
 #define ESOKIT_MEASUREMENTS_REJECTED 3u /* more than a tenth */
-#define ESOKIT_SATURATED 4u /* more than half of the time */
+#define ESOKIT_SATURATED 4u /* more than half of the time, and y is not on its way */
 #define ESOKIT_INNOVATION_TOO_LARGE 6u /* three times that of the noise */
 #define ESOKIT_GAIN_TOO_LARGE_OR_DISTURBED 7u /* b0 is too large, or a load drives u */
 #define ESOKIT_SENSOR_STILL 8u /* y does not change; comes before saturated */
