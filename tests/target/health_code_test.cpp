@@ -54,7 +54,8 @@ void both_look(const loop_state *o, health_state *h, double y)
 template <class V>
 struct Found {
   std::uint32_t samples, rejected, bridged, unsafe;
-  V lost, saturated, side, underway, innovation, gain_ratio, sign_ratio, response, evidence, opposed;
+  V lost, saturated, side, underway, innovation, gain_ratio, sign_ratio, response, evidence,
+      opposed;
   V steady, standing;
   bool reversed;
 };

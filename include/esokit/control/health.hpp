@@ -65,9 +65,9 @@ enum class LoopFault : unsigned char {
   wrong_sign,      ///< b0 has the wrong sign
   gain_too_small,  ///< b0 is several times too small: the loop gain is too large by that factor
   measurements_rejected,  ///< more than a tenth of the measurements are not finite or outliers
-  saturated,              ///< u is at its limits more than half of the time, and y is not on its way
-  bounded,                ///< dhat is at its bound more than half of the time
-  innovation_too_large,   ///< rms above three times that caused by the noise
+  saturated,             ///< u is at its limits more than half of the time, and y is not on its way
+  bounded,               ///< dhat is at its bound more than half of the time
+  innovation_too_large,  ///< rms above three times that caused by the noise
   gain_too_large_or_disturbed,  ///< the effect of u is cancelled: b0 is too large, or a load drives
                                 ///< u
   sensor_still,                 ///< y does not change while u moves or is at a limit
@@ -198,9 +198,9 @@ requires(model_traits<Model>.tells_constant) inline constexpr int simulated_lag<
 /// the rms of y^(n) and phi, both high-passed, does not depend on that delay. A load raises it,
 /// too: it tells of b0 only in a loop that moves u between both limits.
 ///
-/// u at a limit is no fault while y moves where u drives it there: a heater that cools down by itself
-/// at u = 0, an axis on a long way. `underway` is the share of that. Where y stands, or moves the
-/// other way, `saturated` is named.
+/// u at a limit is no fault while y moves where u drives it there: a heater that cools down by
+/// itself at u = 0, an axis on a long way. `underway` is the share of that. Where y stands, or
+/// moves the other way, `saturated` is named.
 ///
 /// With a model (ModelEso) psi is d only, and with an actuator's lag phi is b0 v, from the
 /// simulated output of the actuator.
@@ -413,8 +413,8 @@ requires(detail::is_a_plain_scalar<S>()) class HealthMonitor {
     share(health_.bounded, bounded ? 1 : 0);
   }
 
-  /// Whether y moves where u at a limit drives it, by its mean over an eighth of `memory`: as its sign,
-  /// so that noise has none. @param drives sign of b0 u there, or 0
+  /// Whether y moves where u at a limit drives it, by its mean over an eighth of `memory`: as its
+  /// sign, so that noise has none. @param drives sign of b0 u there, or 0
   void follow(const S& y, int drives) noexcept {
     S moved = y - slow_y_;
     if (!is_finite(moved)) {

@@ -158,7 +158,8 @@ to_structured_text(const HealthMonitor<Size, S>& monitor, const Controller& cont
   block.output(
       "fault : UINT",
       "0: none, 1: the sign of b0 is wrong, 2: b0 is several times too small, 3: more than "
-      "a tenth of y are rejected, 4: u is at a limit more than half of the time and y not on its way, 6: the "
+      "a tenth of y are rejected, 4: u is at a limit more than half of the time and y not on its "
+      "way, 6: the "
       "innovation is three times that of the noise, 7: b0 is too large, or a load drives "
       "u, 8: the sensor stands still");
   for (const char* name : {"gain_ratio", "response", "saturated"}) {
