@@ -303,11 +303,9 @@ ESOKIT_FUNCTION std::vector<Contender> contenders(const TuneModel& model, bool l
   return all;
 }
 
-}  // namespace detail
-
-ESOKIT_FUNCTION Expected<Tuning, Error<double>> tune(const TuneModel& given,
-                                                     const TuneSpecification& specification,
-                                                     const TuneRules& rules) {
+/// The specification and the rules, each in itself.
+inline Check<double> check_rules(const TuneModel& given, const TuneSpecification& specification,
+                                 const TuneRules& rules) {
   Rules<double> checks;
   checks.all_of(given.validate())
       .not_negative("control_noise", specification.control_noise)
@@ -336,92 +334,111 @@ ESOKIT_FUNCTION Expected<Tuning, Error<double>> tune(const TuneModel& given,
       .not_negative("filter_floor", rules.filter_floor.value_or(0.0))
       .demand(!(rules.filter_floor.value_or(0.0) > 1.0), "filter_floor",
               rules.filter_floor.value_or(0.0), "must not be above 1");
-  if (!checks) return checks.error();
-  const int n = given.order;
-  const double T = given.sample_time;
-  const double b0 = given.input_gain.value;
-  Tuning tuning;
-  tuning.rules = rules;
-  tuning.model_disturbance = given.disturbance;
-  const double latency = given.latency();
-  const double fast = 0.5 / T;
-  const auto rho_of = [n](double x) { return std::pow(x, -2 * n); };
-  const auto slowest_of = [&](const TuneModel& of) {
-    return (std::min)(1e-3 * of.filter_bandwidth(), 1e-2 / T);
-  };
-  const auto least_noise = [&](const TuneModel& of) {
-    const double slow = slowest_of(of);
-    const LoopNumbers numbers = LoopCost(of, rules, slow)(Lqg(of).controller(rho_of(slow)));
-    return numbers.stable ? numbers.control_noise : 0.0;
-  };
-  tuning.least_noise = least_noise(given);
-  const double wanted = specification.control_noise > 0.0
-                            ? specification.control_noise
-                            : usual_control_noise * (given.u_max - given.u_min);
+  return checks;
+}
+
+/// The slowest bandwidth that is searched, rad/s.
+inline double slowest_of(const TuneModel& of) {
+  return (std::min)(1e-3 * of.filter_bandwidth(), 1e-2 / of.sample_time);
+}
+
+/// The weight of u for which an LQR law has the bandwidth x.
+inline double rho_of(double x, int order) { return std::pow(x, -2 * order); }
+
+/// Noise in u of a loop that cancels the disturbance alone.
+inline double least_noise(const TuneModel& of, const TuneRules& rules) {
+  const double slow = slowest_of(of);
+  const LoopNumbers numbers = LoopCost(of, rules, slow)(Lqg(of).controller(rho_of(slow, of.order)));
+  return numbers.stable ? numbers.control_noise : 0.0;
+}
+
+/// The model with as much disturbance as the rules want at least: no further than half of the noise
+/// that is allowed, which leaves as much for the law.
+/// @param least noise of the given model @param wanted noise that is allowed
+inline TuneModel with_floor(const TuneModel& given, const TuneRules& rules, double least,
+                            double wanted) {
   TuneModel model = given;
-  const double floor =
-      rules.filter_floor.value_or(usual_filter_floor[static_cast<std::size_t>(n - 1)]) / latency;
-  if (given.filter_bandwidth() < floor) {
-    // No further than half of the noise that is allowed, which leaves as much for the law.
-    const auto noise_at = [&](double bandwidth) {
-      model.disturbance = given.disturbance_of(bandwidth);
-      return least_noise(model);
-    };
-    double low = given.filter_bandwidth(), high = floor;
-    if (2.0 * noise_at(floor) > wanted) {
-      if (2.0 * tuning.least_noise > wanted) {
-        high = low;
-      } else {
-        for (int i = 0; i < 12; ++i) {
-          const double middle = std::sqrt(low * high);
-          (2.0 * noise_at(middle) > wanted ? high : low) = middle;
-        }
-        high = low;
+  const double usual = usual_filter_floor[static_cast<std::size_t>(given.order - 1)];
+  const double floor = rules.filter_floor.value_or(usual) / given.latency();
+  if (!(given.filter_bandwidth() < floor)) return model;
+  const auto noise_at = [&](double bandwidth) {
+    model.disturbance = given.disturbance_of(bandwidth);
+    return least_noise(model, rules);
+  };
+  double low = given.filter_bandwidth(), high = floor;
+  if (2.0 * noise_at(floor) > wanted) {
+    if (2.0 * least > wanted) {
+      high = low;
+    } else {
+      for (int i = 0; i < 12; ++i) {
+        const double middle = std::sqrt(low * high);
+        (2.0 * noise_at(middle) > wanted ? high : low) = middle;
       }
+      high = low;
     }
-    model.disturbance =
-        high > given.filter_bandwidth() ? given.disturbance_of(high) : given.disturbance;
   }
-  tuning.model = model;
-  const Lqg lqg(model);
-  const double slow = slowest_of(model);
-  // What keeps order 2 from oscillating at its limits: sqrt(2) / w is k_1 / k_0 of an LQR law, 2 /
-  // w that of a given bandwidth.
-  const double damped = n == 2 && rules.damping_latencies > 0.0
-                            ? 1.0 / (rules.damping_latencies * latency)
+  model.disturbance =
+      high > given.filter_bandwidth() ? given.disturbance_of(high) : given.disturbance;
+  return model;
+}
+
+/// The bandwidths between which a law is sought, rad/s.
+struct LawRange {
+  double slow;
+  double fast;
+  double damped;  ///< what keeps order 2 from oscillating at its limits, or infinity
+};
+
+inline LawRange law_range(const TuneModel& model, const TuneRules& rules) {
+  // sqrt(2) / w is k_1 / k_0 of an LQR law, 2 / w that of a given bandwidth.
+  const double damped = model.order == 2 && rules.damping_latencies > 0.0
+                            ? 1.0 / (rules.damping_latencies * model.latency())
                             : std::numeric_limits<double>::infinity();
+  return {slowest_of(model), 0.5 / model.sample_time, damped};
+}
+
+/// The bandwidth of the law that the specification asks for, rad/s.
+/// @param tuning with model, rules and least_noise; gets what was asked for
+/// @param wanted noise that is allowed
+inline Expected<double, Error<double>> law_bandwidth(const TuneSpecification& specification,
+                                                     double wanted, const LawRange& range,
+                                                     Tuning& tuning) {
+  const auto& [slow, fast, damped] = range;
+  const TuneModel& model = tuning.model;
+  const double T = model.sample_time;
   const double delay = model.lag + model.dead_time + model.sensor;
-  const double settled = std::array{3.912, 5.834, 7.517}[static_cast<std::size_t>(n - 1)];
+  const double settled = std::array{3.912, 5.834, 7.517}[static_cast<std::size_t>(model.order - 1)];
+  Rules<double> checks;
   double w = 0.0;
   if (specification.controller_bandwidth > 0.0) {
     w = specification.controller_bandwidth;
     checks
-        .demand(detail::at_most(w, fast),
+        .demand(at_most(w, fast),
                 {"controller_bandwidth", w, "must not be above half the sample rate, which is", -1,
                  fast, true})
-        .demand(detail::at_most(1e-6, w * T), "controller_bandwidth", w,
+        .demand(at_most(1e-6, w * T), "controller_bandwidth", w,
                 "must be at least 1e-6 of the sample rate")
-        .demand(detail::at_most(w, 2.0 * damped), {"controller_bandwidth", w,
-                                                   "is so fast for this latency that the loop "
-                                                   "would oscillate between its limits for ever; "
-                                                   "must be at most",
-                                                   -1, 2.0 * damped, true});
+        .demand(at_most(w, 2.0 * damped), {"controller_bandwidth", w,
+                                           "is so fast for this latency that the loop "
+                                           "would oscillate between its limits for ever; "
+                                           "must be at most",
+                                           -1, 2.0 * damped, true});
   } else if (specification.settling_time > 0.0) {
     // Of n equal poles w, after the time that u and y need.
     const auto shortest = [&](double x) { return delay + settled / x; };
     const double safe = (std::min)(fast, 2.0 * damped);
     checks
         .demand(
-            detail::at_most(shortest(fast), specification.settling_time),
+            at_most(shortest(fast), specification.settling_time),
             {"settling_time", specification.settling_time,
              "is shorter than sample time and dead time allow, which is", -1, shortest(fast), true})
-        .demand(detail::at_most(shortest(safe), specification.settling_time),
+        .demand(at_most(shortest(safe), specification.settling_time),
                 {"settling_time", specification.settling_time,
                  "is so short for this latency that the loop would oscillate between its limits "
                  "for ever; "
                  "must be at least",
                  -1, shortest(safe), true})
-        .demand(detail::at_most(specification.settling_time, shortest(slow)),
+        .demand(at_most(specification.settling_time, shortest(slow)),
                 {"settling_time", specification.settling_time,
                  "is far slower than the disturbance; must be at most", -1, shortest(slow), true});
     if (!checks) return checks.error();
@@ -433,105 +450,158 @@ ESOKIT_FUNCTION Expected<Tuning, Error<double>> tune(const TuneModel& given,
         {"control_noise", wanted, "is less than needed to cancel the disturbance alone, which is",
          -1, tuning.least_noise, true});
     if (!checks) return checks.error();
-    const LoopCost cost(model, rules, slow);
-    const auto noise = [&](double x) { return cost(lqg.controller(rho_of(x))).control_noise; };
+    const Lqg lqg(model);
+    const LoopCost cost(model, tuning.rules, slow);
+    const auto noise = [&](double x) {
+      return cost(lqg.controller(rho_of(x, model.order))).control_noise;
+    };
     tuning.control_noise = wanted;
-    w = detail::bandwidth_for(noise, wanted, slow, fast);
+    w = bandwidth_for(noise, wanted, slow, fast);
   }
   if (!checks) return checks.error();
+  return w;
+}
+
+/// Where the search of a family with free poles begins.
+inline std::vector<std::vector<double>> starts_of(const Contender& c,
+                                                  const std::vector<Contender>& all,
+                                                  const TuneSearch& search, double w) {
+  std::vector<std::vector<double>> starts;
+  if (c.design.family != TuneFamily::free_poles) return starts;
+  starts.push_back(search.start(c, search.filter_bandwidth, w, true));
+  // Also from the results of the families that are special cases of this one.
+  for (const Contender& other : all) {
+    const bool half = other.design.family == TuneFamily::half_gain;
+    if (other.design.knows == c.design.knows && other.design.extension == 1 &&
+        (half || other.design.family == TuneFamily::linear)) {
+      const TuneSettings& found = other.design.settings;
+      starts.push_back(search.start(c, found.observer_bandwidth, found.controller_bandwidth, half));
+    }
+  }
+  return starts;
+}
+
+/// The settings of one family with the least cost within the rules.
+/// @param fine the cost on a finer grid
+/// @return the least cost before its damping was asked for
+inline double search_family(Contender& c, const std::vector<Contender>& all, double w,
+                            TuneSearch& search, const LoopCost& fine) {
+  const LoopCost& cost = *search.cost;
+  search.seen.clear();
+  std::vector<std::vector<double>> starts = starts_of(c, all, search, w);
+  const auto free = search.least(c, false, starts);
+  const double least_cost = search.seen.at(free.at).value;
+  auto best = free;
+  best.value = search.value(c, free.at, 40.0);
+  if (best.value > free.value) {
+    if (c.design.family == TuneFamily::free_poles && c.law_numbers > 0) {
+      // Divided otherwise the same poles give nearly the same J and margins.
+      best.value = std::numeric_limits<double>::infinity();
+      for (auto& x : search.divisions(c, free.at)) {
+        const double value = search.value(c, x, 40.0);
+        if (value < best.value) best = {value, std::move(x)};
+      }
+      if (best.value < 1e3) starts.insert(starts.begin(), best.at);
+    }
+    if (best.value > free.value + (starts.empty() ? 2e-3 : 2e-4)) {
+      best = search.least(c, true, starts);
+    }
+  }
+  // What the coarse grid took for enough, and is not; and poles that ring, which few have.
+  if (search.lacks(c, best.at, cost, false) <= 0.0) {
+    const bool too_coarse = search.lacks(c, best.at, fine, false) > 0.0;
+    if (too_coarse || search.lacks(c, best.at, cost, true) > 0.0) {
+      search.seen.clear();
+      search.cost = too_coarse ? &fine : &cost;
+      search.damped = true;
+      best = search.least(c, true, {best.at});
+      search.seen.clear();
+      search.cost = &cost;
+      search.damped = false;
+    }
+  }
+  c.design.settings = as_printed(search.settings(c, best.at));
+  return least_cost;
+}
+
+/// Simulates what the rules ask for, and ranks.
+inline void simulate_and_rank(Tuning& tuning) {
+  const TuneSimulation how = tuning.rules.simulate;
+  if (how == TuneSimulation::all) {
+    for (TunedDesign& design : tuning.designs) {
+      if (design.feasible) simulate_all(design, tuning.model);
+    }
+  }
+  for (bool again = true; again;) {
+    rank(tuning.designs, tuning.model.order);
+    TunedDesign& first = tuning.designs.front();
+    again = how == TuneSimulation::first && first.feasible && !first.simulated;
+    if (again) simulate_all(first, tuning.model);
+  }
+}
+
+/// One search through all families for the law of bandwidth `w`.
+/// @param given_law whether the law is that of equal poles, and not searched for
+inline Check<double> search_designs(Tuning& tuning, const Lqg& lqg, double w, bool given_law) {
+  const TuneModel& model = tuning.model;
+  tuning.rho = rho_of(w, model.order);
+  TuneSearch search = search_for(tuning, given_law);
+  const LoopCost cost = search.coarse();
+  const LoopCost fine(model, tuning.rules, search.slowest(), 50.0);
+  search.cost = &cost;
+  // A sine of known frequency can be cancelled at no cost, so J* is computed without it.
+  TuneModel walking = model;
+  walking.sinusoids.clear();
+  tuning.lqg = LoopCost(walking, tuning.rules, search.slowest(), 50.0)(lqg.controller(tuning.rho));
+  tuning.optimum = tuning.lqg.cost(tuning.rho, model.input_gain.value);
+  Rules<double> checks;
+  checks.demand(tuning.lqg.stable && tuning.optimum > 0.0 && is_finite(tuning.optimum), "optimum",
+                tuning.optimum, "cannot be computed: the numbers of this model are too far apart");
+  if (!checks) return checks;
+  std::vector<Contender> all = contenders(model, given_law);
+  for (Contender& c : all) {
+    const double least_cost = search_family(c, all, w, search, fine);
+    fill_in(c, search, fine, tuning.optimum, std::exp(least_cost));
+  }
+  tuning.designs.clear();
+  for (Contender& c : all) tuning.designs.push_back(std::move(c.design));
+  simulate_and_rank(tuning);
+  return checks;
+}
+
+}  // namespace detail
+
+ESOKIT_FUNCTION Expected<Tuning, Error<double>> tune(const TuneModel& given,
+                                                     const TuneSpecification& specification,
+                                                     const TuneRules& rules) {
+  if (auto ok = detail::check_rules(given, specification, rules); !ok) return ok.error();
+  Tuning tuning;
+  tuning.rules = rules;
+  tuning.model_disturbance = given.disturbance;
+  tuning.least_noise = detail::least_noise(given, rules);
+  const double wanted = specification.control_noise > 0.0
+                            ? specification.control_noise
+                            : usual_control_noise * (given.u_max - given.u_min);
+  tuning.model = detail::with_floor(given, rules, tuning.least_noise, wanted);
+  const TuneModel& model = tuning.model;
+  const detail::LawRange range = detail::law_range(model, rules);
+  auto w = detail::law_bandwidth(specification, wanted, range, tuning);
+  if (!w) return w.error();
+  const Lqg lqg(model);
+  const double asked = specification.settling_time;
   // Of order 3 equal poles seldom keep the rules: there the law is searched for, at its rho.
   const bool given_law =
-      specification.controller_bandwidth > 0.0 || (specification.settling_time > 0.0 && n < 3);
+      specification.controller_bandwidth > 0.0 || (asked > 0.0 && model.order < 3);
   // What the lag adds to the settling time depends on the design.
   for (int corrections = 0;; ++corrections) {
-    tuning.rho = rho_of(w);
-
-    detail::TuneSearch search = detail::search_for(tuning, given_law);
-    const LoopCost cost = search.coarse();
-    const LoopCost fine(model, rules, search.slowest(), 50.0);
-    search.cost = &cost;
-    // A sine of known frequency can be cancelled at no cost, so J* is computed without it.
-    TuneModel walking = model;
-    walking.sinusoids.clear();
-    tuning.lqg = LoopCost(walking, rules, search.slowest(), 50.0)(lqg.controller(tuning.rho));
-    tuning.optimum = tuning.lqg.cost(tuning.rho, b0);
-    checks.demand(tuning.lqg.stable && tuning.optimum > 0.0 && is_finite(tuning.optimum), "optimum",
-                  tuning.optimum,
-                  "cannot be computed: the numbers of this model are too far apart");
-    if (!checks) return checks.error();
-    std::vector<detail::Contender> all = detail::contenders(model, given_law);
-    for (detail::Contender& c : all) {
-      search.seen.clear();
-      std::vector<std::vector<double>> starts;
-      if (c.design.family == TuneFamily::free_poles) {
-        starts.push_back(search.start(c, search.filter_bandwidth, w, true));
-        // Also from the results of the families that are special cases of this one.
-        for (const detail::Contender& other : all) {
-          const bool half = other.design.family == TuneFamily::half_gain;
-          if (other.design.knows == c.design.knows && other.design.extension == 1 &&
-              (half || other.design.family == TuneFamily::linear)) {
-            const TuneSettings& found = other.design.settings;
-            starts.push_back(
-                search.start(c, found.observer_bandwidth, found.controller_bandwidth, half));
-          }
-        }
-      }
-      const auto free = search.least(c, false, starts);
-      const double least_cost = search.seen.at(free.at).value;
-      auto best = free;
-      best.value = search.value(c, free.at, 40.0);
-      if (best.value > free.value) {
-        if (c.design.family == TuneFamily::free_poles && c.law_numbers > 0) {
-          // Divided otherwise the same poles give nearly the same J and margins.
-          best.value = std::numeric_limits<double>::infinity();
-          for (auto& x : search.divisions(c, free.at)) {
-            const double value = search.value(c, x, 40.0);
-            if (value < best.value) best = {value, std::move(x)};
-          }
-          if (best.value < 1e3) starts.insert(starts.begin(), best.at);
-        }
-        if (best.value > free.value + (starts.empty() ? 2e-3 : 2e-4)) {
-          best = search.least(c, true, starts);
-        }
-      }
-      // What the coarse grid took for enough, and is not; and poles that ring, which few have.
-      if (search.lacks(c, best.at, cost, false) <= 0.0) {
-        const bool too_coarse = search.lacks(c, best.at, fine, false) > 0.0;
-        if (too_coarse || search.lacks(c, best.at, cost, true) > 0.0) {
-          search.seen.clear();
-          search.cost = too_coarse ? &fine : &cost;
-          search.damped = true;
-          best = search.least(c, true, {best.at});
-          search.seen.clear();
-          search.cost = &cost;
-          search.damped = false;
-        }
-      }
-      c.design.settings = detail::as_printed(search.settings(c, best.at));
-      detail::fill_in(c, search, fine, tuning.optimum, std::exp(least_cost));
-    }
-    tuning.designs.clear();
-    for (detail::Contender& c : all) tuning.designs.push_back(std::move(c.design));
-    if (rules.simulate == TuneSimulation::all) {
-      for (TunedDesign& design : tuning.designs) {
-        if (design.feasible) detail::simulate_all(design, model);
-      }
-    }
-    for (bool again = true; again;) {
-      detail::rank(tuning.designs, n);
-      TunedDesign& first = tuning.designs.front();
-      again = rules.simulate == TuneSimulation::first && first.feasible && !first.simulated;
-      if (again) detail::simulate_all(first, model);
-    }
+    if (auto ok = detail::search_designs(tuning, lqg, *w, given_law); !ok) return ok.error();
     const TunedDesign* chosen = tuning.chosen();
-    if (!(specification.settling_time > 0.0) || chosen == nullptr ||
-        corrections == (given_law ? 4 : 2) ||
-        (std::abs)(chosen->settling_time - specification.settling_time) <=
-            (std::max)(0.02 * specification.settling_time, T)) {
+    if (!(asked > 0.0) || chosen == nullptr || corrections == (given_law ? 4 : 2) ||
+        (std::abs)(chosen->settling_time - asked) <= (std::max)(0.02 * asked, model.sample_time)) {
       break;
     }
-    w = std::clamp(w * chosen->settling_time / specification.settling_time, slow,
-                   (std::min)(fast, 2.0 * damped));
+    *w = std::clamp(*w * chosen->settling_time / asked, range.slow,
+                    (std::min)(range.fast, 2.0 * range.damped));
   }
   for (TunedDesign& design : tuning.designs) {
     design.code = detail::controller_source(design, model).text(model);
