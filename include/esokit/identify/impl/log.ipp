@@ -122,78 +122,91 @@ ESOKIT_FUNCTION std::size_t bridge(std::vector<double>& column) {
   return found;
 }
 
-}  // namespace detail
+/// As a number of an error.
+inline double number(std::size_t n) { return static_cast<double>(n); }
 
-ESOKIT_FUNCTION Expected<PreparedLog, Error<double>> prepare(const Log& log) {
+/// Whether all columns have as many rows as y, and there is a sample time.
+inline Check<double> check_lengths(const Log& log) {
   using E = Error<double>;
   const std::size_t count = log.y.size();
-  const auto size = [](std::size_t n) { return static_cast<double>(n); };
   if (log.u.size() != count)
-    return E{"u", size(log.u.size()), "must have as many rows as y:", -1, size(count), true};
+    return E{"u", number(log.u.size()), "must have as many rows as y:", -1, number(count), true};
   if (!log.time.empty() && log.time.size() != count) {
-    return E{"time", size(log.time.size()), "must have as many rows as y, or none:",
-             -1,     size(count),           true};
+    return E{"time", number(log.time.size()), "must have as many rows as y, or none:",
+             -1,     number(count),           true};
   }
   for (std::size_t c = 0; c < log.columns.size(); ++c) {
     if (log.columns[c].size() != count) {
       return E{"columns",
-               size(log.columns[c].size()),
+               number(log.columns[c].size()),
                "must have as many rows as y:",
                static_cast<int>(c),
-               size(count),
+               number(count),
                true};
     }
   }
   Rules<double> rules;
   if (log.time.empty()) rules.positive("sample_time", log.sample_time);
-  rules.not_negative("jitter", log.jitter);
-  if (!rules) return rules.error();
-  PreparedLog prepared;
-  LogReport& report = prepared.report;
+  return rules.not_negative("jitter", log.jitter);
+}
+
+/// The rows of a log in which all is finite.
+struct ValidRows {
+  std::vector<std::size_t> at{};  ///< index in the log
+  std::vector<double> time{}, u{}, y{};
+  std::vector<std::vector<double>> columns{};
+
+  /// What was held, of rows without y, too.
+  std::vector<double> held_time{}, held_u{};
+
+  [[nodiscard]] bool holds_more() const { return held_u.size() != u.size(); }
+};
+
+inline Expected<ValidRows, Error<double>> valid_rows(const Log& log, LogReport& report) {
+  const std::size_t count = log.y.size();
   report.rows = count;
   std::vector<std::vector<double>> bridged = log.columns;
-  for (auto& column : bridged) report.lost.push_back(detail::bridge(column));
-  std::vector<std::size_t> good;
+  for (auto& column : bridged) report.lost.push_back(bridge(column));
+  ValidRows rows;
   for (std::size_t k = 0; k < count; ++k) {
     bool finite =
         is_finite(log.u[k]) && is_finite(log.y[k]) && (log.time.empty() || is_finite(log.time[k]));
     for (const auto& column : bridged) finite = finite && is_finite(column[k]);
-    if (finite) good.push_back(k);
+    if (finite) rows.at.push_back(k);
   }
-  report.rejected = count - good.size();
-  if (good.size() < 200)
-    return E{"rows", size(good.size()), "are usable, which is too few: record at least", -1, 200.0,
-             true};
+  report.rejected = count - rows.at.size();
+  if (rows.at.size() < 200) {
+    return Error<double>{
+        "rows", number(rows.at.size()), "are usable, which is too few: record at least", -1, 200.0,
+        true};
+  }
   // The first time is subtracted, so that stamps since 1970 lose no digits.
-  std::vector<double> time, u, y;
-  std::vector<std::vector<double>> columns(log.columns.size());
-  for (const std::size_t k : good) {
-    time.push_back(log.time.empty() ? size(k) * log.sample_time : log.time[k] - log.time[good[0]]);
-    u.push_back(log.u[k]);
-    y.push_back(log.y[k]);
-    for (std::size_t c = 0; c < columns.size(); ++c) columns[c].push_back(bridged[c][k]);
+  const auto time_of = [&](std::size_t k) {
+    return log.time.empty() ? number(k) * log.sample_time : log.time[k] - log.time[rows.at[0]];
+  };
+  rows.columns.resize(log.columns.size());
+  for (const std::size_t k : rows.at) {
+    rows.time.push_back(time_of(k));
+    rows.u.push_back(log.u[k]);
+    rows.y.push_back(log.y[k]);
+    for (std::size_t c = 0; c < rows.columns.size(); ++c) rows.columns[c].push_back(bridged[c][k]);
   }
-  // What was held, of rows without y, too.
-  std::vector<double> held_time, held_u;
-  for (std::size_t i = 0; i < good.size(); ++i) {
-    held_time.push_back(time[i]);
-    held_u.push_back(u[i]);
-    for (std::size_t k = good[i] + 1; i + 1 < good.size() && k < good[i + 1]; ++k) {
-      const double at =
-          log.time.empty() ? size(k) * log.sample_time : log.time[k] - log.time[good[0]];
-      if (!is_finite(log.u[k]) || !(at > held_time.back() && at < time[i + 1])) continue;
-      held_time.push_back(at);
-      held_u.push_back(log.u[k]);
+  for (std::size_t i = 0; i < rows.at.size(); ++i) {
+    rows.held_time.push_back(rows.time[i]);
+    rows.held_u.push_back(rows.u[i]);
+    for (std::size_t k = rows.at[i] + 1; i + 1 < rows.at.size() && k < rows.at[i + 1]; ++k) {
+      const double at = time_of(k);
+      if (!is_finite(log.u[k]) || !(at > rows.held_time.back() && at < rows.time[i + 1])) continue;
+      rows.held_time.push_back(at);
+      rows.held_u.push_back(log.u[k]);
     }
   }
-  std::vector<double> steps;
-  for (std::size_t k = 1; k < time.size(); ++k) {
-    if (!(time[k] > time[k - 1])) {
-      return E{"time", time[k], "does not rise", static_cast<int>(good[k])};
-    }
-    steps.push_back(time[k] - time[k - 1]);
-  }
-  // Within these limits all squares and powers of T are finite.
+  return rows;
+}
+
+/// Within these limits all squares and powers of T are finite.
+inline Check<double> check_sizes(const ValidRows& rows) {
+  Rules<double> rules;
   const auto size_fits = [&](const char* field, const std::vector<double>& values, int index = -1) {
     const auto [low, high] = std::minmax_element(values.begin(), values.end());
     const double largest = (std::max)(-*low, *high);
@@ -201,118 +214,185 @@ ESOKIT_FUNCTION Expected<PreparedLog, Error<double>> prepare(const Log& log) {
         .demand(!(*high > *low) || *high - *low >= 1e-60, field, *high - *low,
                 "is the range of its values, which is too small: use another unit", index);
   };
-  size_fits("u", held_u);
-  size_fits("y", y);
-  for (std::size_t c = 0; c < columns.size(); ++c) {
-    size_fits("columns", columns[c], static_cast<int>(c));
+  size_fits("u", rows.held_u);
+  size_fits("y", rows.y);
+  for (std::size_t c = 0; c < rows.columns.size(); ++c)
+    size_fits("columns", rows.columns[c], static_cast<int>(c));
+  return rules;
+}
+
+/// Sample time, jitter and duration from the steps of time, which must rise.
+inline Check<double> find_sample_time(const Log& log, const ValidRows& rows, LogReport& report) {
+  std::vector<double> steps;
+  for (std::size_t k = 1; k < rows.time.size(); ++k) {
+    if (!(rows.time[k] > rows.time[k - 1]))
+      return Error<double>{"time", rows.time[k], "does not rise", static_cast<int>(rows.at[k])};
+    steps.push_back(rows.time[k] - rows.time[k - 1]);
   }
-  if (!rules) return rules.error();
-  const double middle = detail::median(steps);
+  if (auto fits = check_sizes(rows); !fits) return fits;
+  const double middle = median(steps);
   double sum = 0.0, square = 0.0, regular = 0.0;
   for (const double step : steps) {
     if (step < 1.6 * middle) sum += step, regular += 1.0;
   }
   const double T = log.time.empty() ? log.sample_time : sum / regular;
-  rules.demand(T >= 1e-12 && T <= 1e12, "sample_time", T, "must be between 1e-12 s and 1e12 s");
-  if (!rules) return rules.error();
+  if (!(T >= 1e-12 && T <= 1e12))
+    return Error<double>{"sample_time", T, "must be between 1e-12 s and 1e12 s"};
   for (const double step : steps) {
     if (step < 1.6 * middle) square += (step - T) * (step - T);
   }
   report.sample_time = T;
   report.jitter = log.time.empty() ? log.jitter : std::sqrt(square / regular);
-  report.duration = time.back();
-  report.outliers = detail::mend_outliers(y);
+  report.duration = rows.time.back();
+  return {};
+}
+
+/// Share of rows with u at its largest or smallest value.
+inline double share_at_ends(const std::vector<double>& u) {
   const auto [least, largest] = std::minmax_element(u.begin(), u.end());
   const double reach = 1e-6 * (*largest - *least);
   std::size_t ends = 0;
   for (const double value : u) {
     if (value <= *least + reach || value >= *largest - reach) ++ends;
   }
-  report.saturated = size(ends) / size(u.size());
-  report.quantisation = detail::quantisation_step(y);
+  return number(ends) / number(u.size());
+}
 
-  FitData& data = prepared.data;
-  data.sample_time = T;
-  data.starts.clear();
-  data.columns.resize(columns.size());
-  constexpr double longest_bridge = 5.5;  // rows
-  bool as_logged = held_u.size() == u.size();
-  std::size_t from = 0, held_at = 0;
-  while (from < time.size()) {
-    std::size_t to = from + 1;
-    while (to < time.size() && time[to] - time[to - 1] < longest_bridge * T) ++to;
-    const std::size_t rows = to - from;
-    bool uniform = report.jitter < 0.02 * T && held_u.size() == u.size();
-    for (std::size_t k = from + 1; k < to; ++k)
-      uniform = uniform && time[k] - time[k - 1] < 1.6 * T;
-    if (rows >= 50) {
-      data.starts.push_back(data.y.size());
-      data.start_times.push_back(time[from]);
-      if (uniform) {
-        data.u.insert(data.u.end(), u.begin() + static_cast<std::ptrdiff_t>(from),
-                      u.begin() + static_cast<std::ptrdiff_t>(to));
-        data.y.insert(data.y.end(), y.begin() + static_cast<std::ptrdiff_t>(from),
-                      y.begin() + static_cast<std::ptrdiff_t>(to));
-        data.measured.insert(data.measured.end(), y.begin() + static_cast<std::ptrdiff_t>(from),
-                             y.begin() + static_cast<std::ptrdiff_t>(to));
-        data.offsets.resize(data.y.size(), 0.0);
-        for (std::size_t c = 0; c < columns.size(); ++c) {
-          data.columns[c].insert(data.columns[c].end(),
-                                 columns[c].begin() + static_cast<std::ptrdiff_t>(from),
-                                 columns[c].begin() + static_cast<std::ptrdiff_t>(to));
-        }
-      } else {
-        as_logged = false;
-        std::size_t k = from;
-        const auto grid = static_cast<std::size_t>(std::lround((time[to - 1] - time[from]) / T));
-        report.missing += grid + 1 > rows ? grid + 1 - rows : 0;
-        for (std::size_t g = 0; g < grid; ++g) {
-          const double t = time[from] + size(g) * T;
-          while (k + 2 < to && time[k + 1] <= t) ++k;
-          const double share = std::clamp((t - time[k]) / (time[k + 1] - time[k]), 0.0, 1.0);
-          data.y.push_back(y[k] + share * (y[k + 1] - y[k]));
-          data.measured.push_back(std::numeric_limits<double>::quiet_NaN());
-          data.offsets.push_back(0.0);
-          for (std::size_t c = 0; c < columns.size(); ++c) {
-            data.columns[c].push_back(columns[c][k] + share * (columns[c][k + 1] - columns[c][k]));
-          }
-          double held = 0.0, at = t;
-          while (held_at + 1 < held_u.size() && held_time[held_at + 1] <= t) ++held_at;
-          for (std::size_t j = held_at; at < t + T; ++j) {
-            const double end = j + 1 < held_u.size() ? (std::min)(held_time[j + 1], t + T) : t + T;
-            held += held_u[j] * (std::max)(end - at, 0.0);
-            at = (std::max)(end, at);
-          }
-          data.u.push_back(held / T);
-        }
-        // Each measurement to the nearest row, or the next if that has one.
-        for (std::size_t g = 0, i = from; i < to; ++i) {
-          const double rows_on = (time[i] - time[from]) / T;
-          const auto row = (std::max)(g, static_cast<std::size_t>(std::lround(rows_on)));
-          const double late = rows_on - size(row);
-          if (row >= grid || late < -0.75) continue;
-          data.measured[data.starts.back() + row] = y[i];
-          data.offsets[data.starts.back() + row] = late * T;
-          g = row + 1;
-        }
-      }
-    }
-    if (to < time.size()) {
-      const double rows_between = (std::round)((time[to] - time[to - 1]) / T) - 1.0;
-      report.missing += static_cast<std::size_t>((std::min)(rows_between, 1e15));
-    }
-    from = to;
+/// Lays valid rows onto a grid of one sample time, piece by piece between long gaps.
+class Gridded {
+ public:
+  Gridded(const ValidRows& rows, LogReport& report, FitData& data)
+      : rows_(rows), report_(report), data_(data), as_logged_(!rows.holds_more()) {
+    data_.sample_time = report.sample_time;
+    data_.starts.clear();
+    data_.columns.resize(rows.columns.size());
   }
-  if (as_logged) data.measured = data.offsets = {};
-  report.pieces = data.starts.size();
-  data.one_load = data.unknown_before = true;
-  if (data.y.size() < 200)
-    return E{"rows",
-             size(data.y.size()),
-             "between gaps are too few: record without gaps at least",
-             -1,
-             200.0,
-             true};
+
+  void all_pieces() {
+    constexpr double longest_bridge = 5.5;  // rows
+    const double T = data_.sample_time;
+    const std::vector<double>& time = rows_.time;
+    std::size_t from = 0;
+    while (from < time.size()) {
+      std::size_t to = from + 1;
+      while (to < time.size() && time[to] - time[to - 1] < longest_bridge * T) ++to;
+      if (to - from >= 50) piece(from, to);
+      if (to < time.size()) {
+        const double rows_between = (std::round)((time[to] - time[to - 1]) / T) - 1.0;
+        report_.missing += static_cast<std::size_t>((std::min)(rows_between, 1e15));
+      }
+      from = to;
+    }
+    if (as_logged_) data_.measured = data_.offsets = {};
+    report_.pieces = data_.starts.size();
+    data_.one_load = data_.unknown_before = true;
+  }
+
+ private:
+  void piece(std::size_t from, std::size_t to) {
+    data_.starts.push_back(data_.y.size());
+    data_.start_times.push_back(rows_.time[from]);
+    bool uniform = report_.jitter < 0.02 * data_.sample_time && !rows_.holds_more();
+    for (std::size_t k = from + 1; k < to; ++k)
+      uniform = uniform && rows_.time[k] - rows_.time[k - 1] < 1.6 * data_.sample_time;
+    if (uniform) {
+      take(from, to);
+    } else {
+      as_logged_ = false;
+      resample(from, to);
+    }
+  }
+
+  /// Rows as they are.
+  void take(std::size_t from, std::size_t to) {
+    const auto append = [&](std::vector<double>& all, const std::vector<double>& more) {
+      all.insert(all.end(), more.begin() + static_cast<std::ptrdiff_t>(from),
+                 more.begin() + static_cast<std::ptrdiff_t>(to));
+    };
+    append(data_.u, rows_.u);
+    append(data_.y, rows_.y);
+    append(data_.measured, rows_.y);
+    data_.offsets.resize(data_.y.size(), 0.0);
+    for (std::size_t c = 0; c < data_.columns.size(); ++c)
+      append(data_.columns[c], rows_.columns[c]);
+  }
+
+  /// y and columns on straight lines between their rows, and u as the mean of what was held.
+  void resample(std::size_t from, std::size_t to) {
+    const double T = data_.sample_time;
+    const std::vector<double>& time = rows_.time;
+    const auto grid = static_cast<std::size_t>(std::lround((time[to - 1] - time[from]) / T));
+    report_.missing += grid + 1 > to - from ? grid + 1 - (to - from) : 0;
+    std::size_t k = from;
+    for (std::size_t g = 0; g < grid; ++g) {
+      const double t = time[from] + number(g) * T;
+      while (k + 2 < to && time[k + 1] <= t) ++k;
+      const double share = std::clamp((t - time[k]) / (time[k + 1] - time[k]), 0.0, 1.0);
+      const auto between = [&](const std::vector<double>& of) {
+        return of[k] + share * (of[k + 1] - of[k]);
+      };
+      data_.y.push_back(between(rows_.y));
+      data_.measured.push_back(std::numeric_limits<double>::quiet_NaN());
+      data_.offsets.push_back(0.0);
+      for (std::size_t c = 0; c < data_.columns.size(); ++c)
+        data_.columns[c].push_back(between(rows_.columns[c]));
+      data_.u.push_back(mean_input(t));
+    }
+    // Each measurement to the nearest row, or the next if that has one.
+    for (std::size_t g = 0, i = from; i < to; ++i) {
+      const double rows_on = (time[i] - time[from]) / T;
+      const auto row = (std::max)(g, static_cast<std::size_t>(std::lround(rows_on)));
+      const double late = rows_on - number(row);
+      if (row >= grid || late < -0.75) continue;
+      data_.measured[data_.starts.back() + row] = rows_.y[i];
+      data_.offsets[data_.starts.back() + row] = late * T;
+      g = row + 1;
+    }
+  }
+
+  /// Of what was held from t to t + T; t rises from call to call.
+  double mean_input(double t) {
+    const double T = data_.sample_time;
+    const std::vector<double>& since = rows_.held_time;
+    double held = 0.0, at = t;
+    while (held_at_ + 1 < since.size() && since[held_at_ + 1] <= t) ++held_at_;
+    for (std::size_t j = held_at_; at < t + T; ++j) {
+      const double end = j + 1 < since.size() ? (std::min)(since[j + 1], t + T) : t + T;
+      held += rows_.held_u[j] * (std::max)(end - at, 0.0);
+      at = (std::max)(end, at);
+    }
+    return held / T;
+  }
+
+  const ValidRows& rows_;
+  LogReport& report_;
+  FitData& data_;
+  bool as_logged_;
+  std::size_t held_at_ = 0;
+};
+
+}  // namespace detail
+
+ESOKIT_FUNCTION Expected<PreparedLog, Error<double>> prepare(const Log& log) {
+  if (auto ok = detail::check_lengths(log); !ok) return ok.error();
+  PreparedLog prepared;
+  LogReport& report = prepared.report;
+  auto rows = detail::valid_rows(log, report);
+  if (!rows) return rows.error();
+  if (auto ok = detail::find_sample_time(log, *rows, report); !ok) return ok.error();
+  report.outliers = detail::mend_outliers(rows->y);
+  report.saturated = detail::share_at_ends(rows->u);
+  report.quantisation = detail::quantisation_step(rows->y);
+  FitData& data = prepared.data;
+  detail::Gridded(*rows, report, data).all_pieces();
+  if (data.y.size() < 200) {
+    return Error<double>{"rows",
+                         detail::number(data.y.size()),
+                         "between gaps are too few: record without gaps at least",
+                         -1,
+                         200.0,
+                         true};
+  }
   return prepared;
 }
 
