@@ -297,10 +297,10 @@ Design Design::make(const Settings& settings, const Input& input, const Findings
   }
   if (taken.simulated && taken.recovers) {
     design.summary_.push_back(
-        "It was simulated with limits and noise, on the model and at the ends of its intervals: it "
+        "It was simulated with limits and noise, on the model and at the ends of its intervals. It "
         "recovers from " +
-        esokit::detail::in_words(esokit::overloads[0], model) + ", from " +
-        esokit::detail::in_words(esokit::overloads[1], model) + ", from " +
+        esokit::detail::in_words(esokit::overloads[0], model) + " and from " +
+        esokit::detail::in_words(esokit::overloads[1], model) + ". It also recovers from " +
         esokit::detail::in_words(esokit::overloads[2], model) + " and from " +
         esokit::detail::in_words(esokit::overloads[3], model) + ".");
   }

@@ -110,13 +110,10 @@ void Page::add_to(esokit::examples::Report& report) const {
         report.add(item.figures[0]);
         break;
       case Kind::box:
-      case Kind::bad_box: {
-        std::string text = item.text + ":";
-        for (const auto& line : item.rows[0])
-          text += ' ' + line + (line.ends_with('.') || line.ends_with('?') ? "" : ".");
-        report.remark(text);
+      case Kind::bad_box:
+        report.remark(item.text + ":");
+        for (const auto& line : item.rows[0]) report.remark(line);
         break;
-      }
       default:
         break;
     }
