@@ -1,6 +1,6 @@
 // A joint that meets an obstacle: from which dhat on it is one. How often the alarm of
-// `disturbance_alarm` comes without an obstacle, and how long after a load, against what it says;
-// for orders 1 to 3 and both signs of b0; and with noise that is not white.
+// `disturbance_alarm` comes without an obstacle, and how long after a load, against what it says.
+// For orders 1 to 3, both signs of b0, and noise that is not white.
 //
 // Plant       y^(n) = b0 u + d, b0 = 20 or -20; the joint: n = 2, J = 0.05 kg m^2
 // Sensor      white noise, sd 1e-4 rad; or through a filter of 2 ms; or 16384 counts a turn

@@ -227,7 +227,7 @@ requires(detail::goes_into_a_loop<Observer>()) class Adrc {
   ///     if (controller.elapsed(seconds)) u = controller.update(y, r);
   ///
   /// After a pause the observer first predicts in steps of at most T what happened under the u that
-  /// was held, so that nothing is lost; after more than max_gap + 1 of them it restarts. With a
+  /// was held, so that nothing is lost. After more than max_gap + 1 of them it restarts. With a
   /// time below T / ratio, also zero, `update` changes nothing and returns the last u: that time
   /// counts with the next one. A time that is negative or not finite is refused and changes
   /// nothing. The observer's gains, the rate limit (for one step, also after a pause) and, if
