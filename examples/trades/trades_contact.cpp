@@ -245,8 +245,8 @@ int main(int argc, char** argv) {
   report.expect("obstacle", "alarm after (ms)", 1e3 * (stopped - met), stopped > met, "after it");
 
   // Not noise: 5 rad/s^2 with an inertia that is 10 % larger than b0 says.
-  report.expect("motion", "5 rad/s^2, inertia 10 % larger (thresholds)",
-                0.1 * 5 / alarm.threshold, true, "reported");
+  report.expect("motion", "5 rad/s^2, inertia 10 % larger (thresholds)", 0.1 * 5 / alarm.threshold,
+                true, "reported");
 
   Figure figure("contact", {.rows = 1, .columns = 2, .panel_height = 220});
   figure.caption(
