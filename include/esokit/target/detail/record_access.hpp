@@ -606,8 +606,8 @@ struct RecordAccess {
   static auto health(const M& m, const C& c) noexcept {
     using S = typename M::scalar_type;
     struct Numbers {
-      S weight, rare_weight, quick_weight, large_move, hair, largest_square, range, pole, slow, middle,
-          least_against, least, step, forget;
+      S weight, rare_weight, quick_weight, large_move, hair, largest_square, range, pole, slow,
+          middle, least_against, least, step, forget;
       S input_gain, of_noise;
       int divider;
     } numbers;
