@@ -118,16 +118,11 @@ int main(int argc, char** argv) {
 
   Figure figure("tradeoff", {.rows = 2, .columns = 2, .panel_height = 260});
   figure.caption(
-      "Each curve is one family. Each point is its best design for one requirement that keeps a "
-      "modulus margin of 0.5, a delay margin of two samples, and stability with a b0 that is wrong "
-      "by a factor of two; a curve ends where the family cannot keep them. Horizontal axis: the "
-      "requirement, as the bandwidth of the control law divided by that of the filter in the LQG "
-      "controller that meets it (left: slow, little noise in u). Vertical axis: sqrt(J / J*), "
-      "where J* is the cost of this LQG controller, which is the best linear one and keeps no "
-      "margins; 1.1 means deviations 10 % larger. Upper right: all families but the free poles are "
-      "within a few percent of each other until the requirement is fast. Lower left: it pays to "
-      "have the lag in the model. Lower right: it pays to have a slow, smooth disturbance in the "
-      "model; otherwise m = 2 and the cascades come next.");
+      "A point is the best design of a family for one requirement; a curve ends where it cannot "
+      "keep the margins. Across: the requirement, as the bandwidth of the law over that of the "
+      "filter in the best linear controller (left: little noise in u). Up: sqrt(J / J*), 1 for "
+      "that controller, which keeps no margins; 1.1 means deviations 10 % larger. Lower left: it "
+      "pays to have the lag in the model; lower right: a slow, smooth disturbance.");
   for (std::size_t c = 0; c < all.size(); ++c) {
     Panel& panel = figure.panel(c / 2, c % 2).title(all[c].name);
     panel.name("case" + std::to_string(c + 1))
