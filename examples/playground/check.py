@@ -87,7 +87,7 @@ def taken_over(page, found, name, check):
     """The design in the playground is that of the page: noise moves u by as much."""
     page.value("$('toplay').click()")
     check(page.value("$('refusal').textContent") == "", f"{name}: the playground refuses {found['address']}")
-    ours = page.value("100 * result.numbers[0].noise / (2 * state.limit)")
+    ours = page.value("100 * result.numbers[0].noise / ((1 + state.down) * state.limit)")
     row = next(row for row in re.findall(r"<tr>.*?</tr>", found["main"], re.S)
                if re.search(r"scope=.row.>\d+ " + re.escape(found["design"]) + "<", row))
     says = float(re.findall(r"<td>([^<]*)</td>", row)[4])

@@ -17,7 +17,7 @@ std::array<std::string, 2> c_with(const Settings& s, typename Observer::Config o
   observer.sample_time = s[sample_time];
   typename esokit::Adrc<Observer>::Config config{.observer = observer,
                                                  .controller_bandwidth = s[controller_bandwidth]};
-  config.limits.lower = -s[limit];
+  config.limits.lower = -s[down] * s[limit];
   config.limits.upper = s[limit];
   if (s[rate] > 0.0) config.limits.rate = s[rate];
   if (s[soften] > 0.0) config.soften = s[soften] > 1.0;

@@ -45,7 +45,13 @@ void take_over(const from_log::Outcome& outcome, LogResult& result) {
       fast *= std::pow(std::abs(pole), 1.0 / static_cast<double>(poles.size()));
   }
   const double gain = std::abs(model.input_gain.value);
+  // As the actuator has them, where it may rest at zero; u has the other sign with a negative b0.
+  const bool turned = model.input_gain.value < 0.0;
+  const double up = turned ? -model.u_min : model.u_max;
+  const double least = turned ? -model.u_max : model.u_min;
+  const bool rests = up > 0.0 && least <= 0.0;
   const double half = 0.5 * (model.u_max - model.u_min);
+  const double limit = rests ? up : half;
   const auto set = [&](const char* name, double value) {
     result.address +=
         (result.address.empty() ? "" : "&") + std::string(name) + "=" + text_of(value);
@@ -79,15 +85,18 @@ void take_over(const from_log::Outcome& outcome, LogResult& result) {
   set("soften", taken->settings.soften ? 2 : 1);
   const esokit::SeenCurve& curve = outcome.findings.curve;
   const bool dead = curve.kind == esokit::CurveKind::dead_zone;
+  // The limits of the model are those of the effect: before its dead zone u goes further.
+  const double zone = dead ? curve.size.value : 0.0;
   if (dead) {
-    set("dead_zone", curve.size.value);
+    set("dead_zone", zone);
     set("knows_curve", 1);
   }
-  set("limit", half + (dead ? curve.size.value : 0.0));
+  set("limit", limit + zone);
+  set("down", !rests ? 1.0 : least < 0.0 ? (zone - least) / (limit + zone) : 0.0);
   set("sample_time", model.sample_time);
   // So that u may be at its limit for a moment, and in whole settling times.
   const double power = std::pow(slow, model.order + (taken->knows.lag ? 1 : 0));
-  set("reference", 0.9 * half * gain / power / (taken->knows.lag ? model.lag : 1.0));
+  set("reference", 0.9 * limit * gain / power / (taken->knows.lag ? model.lag : 1.0));
   const double settling = std::max(taken->settling_time, 10 * model.latency());
   set("samples", std::clamp(std::round(8 * settling / model.sample_time), 200.0, 20000.0));
   result.design = taken->name;
@@ -104,8 +113,11 @@ void take_over(const from_log::Outcome& outcome, LogResult& result) {
   if (curve.kind == esokit::CurveKind::square)
     result.taken += " The actuator acts as a square: there, u is its effect.";
   if (model.input_gain.value < 0.0) result.taken += " b0 is negative: there, u has the other sign.";
-  if (model.u_max + model.u_min != 0.0)
+  if (!rests) {
     result.taken += " Its limits lie symmetrically, u counts from their middle.";
+  } else if (!(least < 0.0)) {
+    result.taken += " u does not go below zero: downwards y moves by itself alone.";
+  }
 }
 
 }  // namespace

@@ -79,8 +79,10 @@ constexpr std::array<Field, field_count> all_fields{{
      "DelayedInput, whole samples"},
     {"knows_curve", "knows dead zone and gains", "", "Controller", Kind::on_off, 0, 1, 0, "",
      "MappedInput, the curve of the actuator"},
-    {"limit", "limit of u, \u00b1", "u", "Controller", Kind::number, 1e-3, 1e5, 5, "",
+    {"limit", "limit of u", "u", "Controller", Kind::number, 1e-3, 1e5, 5, "",
      "what the actuator can give, and the controller knows"},
+    {"down", "the same downwards, times that", "", "Controller", Kind::number_or_none, 1e-2, 10, 1,
+     "", "0: it cannot pull, as a heater"},
     {"rate", "limit of its rate", "u/s", "Controller", Kind::number_or_none, 1e-2, 1e6, 0, "",
      "how fast the actuator can change"},
     {"reference", "reference step", "y", "Run", Kind::number, 1e-3, 1e3, 1, "",
@@ -210,7 +212,8 @@ ActuatorCurve curve_of(const Settings& s) {
 // Of the law, which asks for an effect where the curve is known: the map is behind it, as in
 // MappedInput, but once for all types.
 double limit_of(const Settings& s, double sign) {
-  return maps(s) ? effect_of(s, sign * s[limit]) : sign * s[limit];
+  const double u = sign < 0.0 ? -s[down] * s[limit] : s[limit];
+  return maps(s) ? effect_of(s, u) : u;
 }
 
 // ---- the controller ----
@@ -407,7 +410,8 @@ Outcome run_one(const Settings& s, const Plant<6>& plant, double step, AnyContro
     }
     numbers[largest_input] = std::max(numbers[largest_input], std::abs(u));
     // Behind a map to rounding.
-    if (std::abs(u) >= s[limit] * (1.0 - 1e-12))
+    constexpr double almost = 1.0 - 1e-12;
+    if (u >= almost * s[limit] || u <= -almost * s[down] * s[limit])
       numbers[at_limit] += 1.0 / static_cast<double>(count);
     if (trace.t == nullptr) return;
     sent[static_cast<std::size_t>(sample.index) % (late + 1)] = sample.input;
@@ -676,7 +680,8 @@ std::string code_of(const Settings& s, double step) {
   text += "#include <esokit/control/adrc.hpp>\n#include <esokit/observer/" + std::string(header) +
           ".hpp>\n\nint main() {\n  using Observer = " + type +
           ";\n  auto controller = esokit::Adrc<Observer>::make(\n      {.observer = " + config +
-          ",\n       " + gains + ",\n       .limits = {.lower = " + text_of(-s[limit]) +
+          ",\n       " + gains +
+          ",\n       .limits = {.lower = " + text_of(s[down] > 0.0 ? -s[down] * s[limit] : 0.0) +
           ", .upper = " + text_of(s[limit]) +
           (s[rate] > 0.0 ? ", .rate = " + text_of(s[rate]) : "") +
           "}});\n  if (!controller) return 1;  // controller.error() names the field, the value "

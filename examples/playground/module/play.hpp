@@ -45,6 +45,7 @@ enum Index {
   knows_dead_time,
   knows_curve,
   limit,
+  down,  // the least u is so many times -limit
   rate,
   reference,
   sample_time,
