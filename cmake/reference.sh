@@ -1,16 +1,17 @@
 #!/usr/bin/env bash
 # cmake/reference.sh [--no-install]: writes the reference with Doxygen and prints where it is. Any
 # warning is a failure (1), and so are a name of the namespace detail on a page and a class that is made
-# from settings and has no example. Installs Doxygen if it is missing; with --no-install it only names
-# the Debian package (3).
+# from settings and has no example. Installs Doxygen and Python 3 if they are missing; with --no-install
+# it only names the Debian packages (3).
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 source cmake/debian_packages.sh
 
-if ! command -v doxygen >/dev/null 2>&1; then
-  require_packages "$@" doxygen
-  if ! command -v doxygen >/dev/null 2>&1; then
-    echo "doxygen is not on the PATH" >&2
+has_tools() { command -v doxygen >/dev/null 2>&1 && command -v python3 >/dev/null 2>&1; }
+if ! has_tools; then
+  require_packages "$@" doxygen python3
+  if ! has_tools; then
+    echo "doxygen or python3 is not on the PATH" >&2
     exit 3
   fi
 fi
