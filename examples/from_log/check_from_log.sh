@@ -560,6 +560,8 @@ shows rows short.csv
 servo >rows.txt
 written t,y,u , t 'if (1) $3 = 1;' >constant.csv
 shows "u = 1: never changes" constant.csv
+[[ $said == *"refused: u is the same in all rows. Is it the right column (--u)?"* ]]
+verdict $? "constant.csv does not say what to do: $said"
 [[ $said != *arning* && $said == *"never changes"* ]]
 verdict $? "constant.csv: $said"
 written t,y,u , t 'if (1) { x += (u - x) / 100; u = NR > 900 ? 5 : 0; $2 = x; $3 = u }' >single_step.csv

@@ -731,7 +731,7 @@ Input read_log(const Settings& settings) {
   clock.steady = is_steady(stamps, clock.step);
   if (!clock.whole) clock.rounder = rounder_unit(numbers);
   if (!(clock.step > 0.0) && stamps.size() < 2)
-    throw LogError(settings.file + ": the log has only one sample");
+    throw LogError(settings.file + ": the log has one row only: record at least 200");
   if (!(clock.step > 0.0)) {
     throw LogError(settings.file + ": time stands still: column " + input.time + " is " +
                    number_text(origin, 10) +
@@ -747,16 +747,17 @@ Input read_log(const Settings& settings) {
   input.merged = topics();
   if (input.merged) merge(input);
   unwrap(settings, input);
-  if (input.log.time.size() < 2) throw LogError(settings.file + ": the log has only one sample");
+  if (input.log.time.size() < 2)
+    throw LogError(settings.file + ": the log has one row only: record at least 200");
   // A gap is bridged or cut out; one so long is a clock that was set, or two recordings.
   const double T = esokit::examples::median_step(input.log.time);
   for (std::size_t k = 1; k < input.log.time.size(); ++k) {
     const double jump = input.log.time[k] - input.log.time[k - 1];
     if (jump <= 50.0 * T) continue;
-    input.alarms.push_back({"time-jump", "Time jumps by " + number_text(jump, 4) + " s at line " +
+    input.alarms.push_back({"time-jump", "Time jumps by " + time_text(jump) + " at line " +
                                              std::to_string(input.line[k]) +
-                                             " (usually, two rows are " + number_text(T, 3) +
-                                             " s apart): the clock was set, or the file contains "
+                                             " (usually, two rows are " + time_text(T) +
+                                             " apart): the clock was set, or the file contains "
                                              "two recordings. The parts before and after are "
                                              "treated separately."});
     break;

@@ -65,14 +65,22 @@ std::string in_words(const std::string& field, const esokit::Identified& found) 
       {"correlation",
        "Something moves y that neither u nor the model has, or y was filtered. Log the u that the "
        "actuator held, y before its filters, and known effects (--measured COLUMN). Steps of u "
-       "that last until y settles let output error decide instead."},
+       "that last until y settles help, too: then a fit that simulates y from u alone can tell "
+       "b0."},
+      {"u",
+       "u is the same in all rows. Is it the right column (--u)? Else step it up and down ten "
+       "times "
+       "or more while you log, with pauses in which the machine settles."},
+      {"y",
+       "y is the same in all rows. Is it the right column (--y), and was the sensor on? Else log a "
+       "motion that it can see."},
       {"second_opinion",
        "From row to row y follows u by another b0 than over the whole log. Often the order is not "
        "that of the machine (--order), the actuator saturates or is not linear, or u was logged "
        "late. Log the u that the actuator held, and y without filters."},
       {"plateau",
-       "b0 depends on the frequency. Log motion in the frequency band of the controller: faster "
-       "steps, or a sweep."},
+       "Slow and fast motion give different b0. Log faster steps, or a sweep up to the bandwidth "
+       "that the controller should have."},
       {"interval",
        "b0 is not known well enough. Record a longer log, or use larger steps; both make its "
        "interval smaller."},
@@ -97,7 +105,10 @@ std::string in_words(const std::string& field, const esokit::Identified& found) 
            "what moves it (--measured COLUMN).";
   }
   // What depends on the size of u looks as if it depended on the frequency.
-  if (field == "plateau" && found.by_size.differ()) return "b0 depends on the size of u.";
+  if (field == "plateau" && found.by_size.differ()) {
+    return "b0 depends on the size of u: the actuator is not proportional. Log the u that it held, "
+           "or steps of one size, as large as those of the controller.";
+  }
   const auto at = all.find(field);
   return at == all.end() ? "" : at->second;
 }
@@ -307,7 +318,7 @@ std::vector<CsvRow> log_table(const Input& input, const Findings& findings) {
                   log.jitter < 1e-9 * log.sample_time
                       ? "no jitter"
                       : "jitter " + number_text(1e3 * log.jitter, 3) + " ms"});
-  rows.push_back({"duration", number_text(log.duration, 5) + " s",
+  rows.push_back({"duration", duration_text(log.duration),
                   std::to_string(log.pieces) + (log.pieces == 1 ? " piece" : " pieces")});
   rows.push_back({"missing rows", std::to_string(log.missing),
                   std::to_string(log.rejected) + " rows without a number, " +
