@@ -186,6 +186,7 @@ TEST(Clock, FractionsThatAreRoundInAnotherUnit) {
   };
   EXPECT_FALSE(clock(0, 60, 1, 8).told());
   EXPECT_FALSE(clock(0, 60, 1, 4).told());
+  EXPECT_FALSE(clock(0, 60, 1, 2).told());        // too few digits for that, but the mean step
   EXPECT_FALSE(clock(17.3, 60, 0.75, 8).told());  // 0.288333 and steps of 0.0125
   EXPECT_FALSE(clock(0, 86400, 45, 9).told());
   EXPECT_FALSE(clock(0, 3600, 2700.5, 9).told());
