@@ -205,6 +205,8 @@ TEST(Clock, CountersOfWeeksAreNoDatesOfOldEpochs) {
   EXPECT_FALSE(from_log::judge_clock(read(written(at, 1e-6, 0.025, 2000, 0))).told());
   EXPECT_FALSE(from_log::judge_clock(read(written(at, 1e-9, 0.025, 2000, 0))).told());
   EXPECT_FALSE(from_log::judge_clock(read(written(at, 60, 0.125, 2000, 8))).told());
+  // Thirty days in minutes are 2018 in days of a spreadsheet, with rows of 24 minutes.
+  EXPECT_FALSE(from_log::judge_clock(read(written(30 * day, 60, 1, 2000, 8))).told());
   // Seconds since 1904 of LabVIEW: so, and with an alarm where they may be ms.
   const auto lab = [](double T, int decimals) {
     return from_log::judge_clock(read(written(120.9 * year, 1, T, 2000, decimals)));
