@@ -14,6 +14,8 @@ ESOKIT_CLUSTER_PACKAGES=(libopenmpi-dev openmpi-bin parallel)
 ESOKIT_FIRMWARE_PACKAGES=(gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib
   gcc-riscv64-unknown-elf picolibc-riscv64-unknown-elf qemu-system-arm qemu-system-misc
   gcc-avr avr-libc simavr)
+# The written C before a prover that knows nothing of esokit.
+ESOKIT_PROOF_PACKAGES=(frama-c-base python3)
 # HAL of LinuxCNC, for the C as one of its components.
 ESOKIT_LINUXCNC_PACKAGES=(linuxcnc-uspace-dev)
 # The same headers in a browser (examples/playground); nodejs is not needed.

@@ -174,7 +174,7 @@ text_bytes() {
 written_bytes() {
   find "$root/build/$1" -path '*written_*objects*' -name "$2.c.obj" \
     -exec "${binutils[$1]}size" -A {} + | awk '
-    ($1 ~ /^\.(text|rodata)/) && $1 !~ /self_test|samples/ { bytes += $2 }
+    ($1 ~ /^\.(text|rodata)/) && $1 !~ /self_test|samples|called|calls/ { bytes += $2 }
     END { print bytes + 0 }'
 }
 

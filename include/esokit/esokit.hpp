@@ -213,6 +213,7 @@
 #include <esokit/target/detail/recorded_design.hpp>
 #include <esokit/target/detail/recorded_numbers.hpp>
 #include <esokit/target/detail/runtime_text.hpp>
+#include <esokit/target/detail/self_test.hpp>
 #include <esokit/target/detail/st_translator.hpp>
 #include <esokit/target/detail/writable.hpp>
 #include <esokit/target/detail/written_names.hpp>

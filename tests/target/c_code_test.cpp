@@ -115,6 +115,13 @@ TEST(CCode, ByClang) {
   equals<LinearEso<2, float>>(20000, 131, "clang -std=c99 -ffp-contract=off");
 }
 
+/// What a prover reads in place of the bits of a number refuses the same numbers.
+TEST(CCode, AsAProverReadsIt) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  equals<LinearEso<2, float>>(20000, 161, "gcc -std=c99 -D__FRAMAC__");
+  equals<LinearEso<2, double>>(20000, 171, "gcc -std=c99 -D__FRAMAC__");
+}
+
 /// Whatever the compiler may assume of numbers, bad ones never get into the state.
 TEST(CCode, RefusesBadNumbersUnderFastMath) {
   if (!there("gcc")) GTEST_SKIP() << "no gcc";

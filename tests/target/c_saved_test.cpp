@@ -249,6 +249,49 @@ TEST(CSaved, KeepsSettings) {
   EXPECT_GT(recovering, 10);
 }
 
+/// After a load with other settings in force as much is due as after a change of settings: a gap
+/// that would be bridged by what was due before restarts.
+TEST(CSaved, CountsAnewWhatIsDue) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  using C = Adrc<LinearEso<2, double>>;
+  CodeOptions options = saves;
+  options.settings_in_struct = true;
+  auto settings = plain_config<C>();
+  settings.observer.observer_bandwidth = 100;
+  settings.observer.max_gap = 20;
+  settings.missing.most = 50;
+  const C fresh = C::make(settings).value();
+  const int longest = fresh.observer().longest_gap();
+  const Folder folder;
+  InC<double> in_c(folder, to_c(fresh, options).value(), true);
+  ASSERT_TRUE(in_c.loaded());
+  const auto begin = in_c.state();
+  int more = 0;
+  for (int gap = 1; gap <= longest; ++gap) {
+    C mine = fresh;
+    in_c.state() = begin;
+    const auto sample = [&](double y) {
+      EXPECT_TRUE(equal_bits(mine.update(y, 1.0), in_c.update(y, 1.0))) << gap;
+      EXPECT_EQ(in_c.probe() % 512, static_cast<unsigned>(mine.status())) << gap;
+    };
+    const auto lose = [&](int samples) {
+      for (int i = 0; i < samples; ++i) sample(hidden_nan<double>());
+    };
+    sample(0.1);
+    lose(gap);
+    sample(0.2);
+    const int due = mine.observer().recovering();
+    ASSERT_TRUE(in_c.load(in_c.save(), 0, 0.5));
+    EXPECT_TRUE(mine.adopt(fresh));
+    miss(mine, 0, 0.5, 1.0);
+    for (int i = 0; i < due; ++i) sample(0.3);
+    more += mine.observer().recovering() > 0;
+    lose(longest - 1);
+    sample(0.4);
+  }
+  EXPECT_GT(more, 3);
+}
+
 TEST(CSaved, OfAnObserver) {
   if (!there("gcc")) GTEST_SKIP() << "no gcc";
   using O = LinearEso<2, double>;

@@ -36,8 +36,9 @@ CCode c_code(const RecordedDesign& design);
 /// The controller or observer as C99, two files without a library.
 ///
 /// They have a state struct, init, update, estimates in physical units, and a self-test that
-/// compares with the C++ (compiled if `NAME_SELF_TEST` is defined). A controller also has start, an
-/// observer reset, predict and correct. What is done at a sample is recorded from its own calls, so
+/// compares with the C++, also through gaps, restarts, safe mode, bad numbers and reports (compiled
+/// if `NAME_SELF_TEST` is defined). A controller also has start, an observer reset, predict and
+/// correct. What is done at a sample is recorded from its own calls, so
 /// there is no second implementation. Settings are constants. With `settings_in_struct`, gains and
 /// limits are a struct that `name_adopt` changes while it runs, as `adopt` does. Bad and missing
 /// samples, gaps, restarts, the start hold and safe mode are those of the object, too.

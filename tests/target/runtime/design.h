@@ -93,6 +93,9 @@ typedef double real;
 #define LARGEST number(1e30)
 #define GAINS 3
 #define SAMPLES 1
+#define CALLS 1
+#define CALL_LATER 0u
+#define DESIGN_CALLS 0u
 #if ESOKIT_MOVES
 #define DESIGN_R real r, real r1, real r2
 #define DESIGN_R_GIVEN r, r1, r2
@@ -101,7 +104,7 @@ typedef double real;
 #define DESIGN_MOTION r1, r2
 #define DESIGN_R_AT_REST y, number(0.0), number(0.0)
 #define DESIGN_R_IS_FINITE is_finite(r) && is_finite(r1) && is_finite(r2)
-#define DESIGN_SAMPLE_R samples[i][1], samples[i][2], samples[i][3]
+#define DESIGN_SAMPLE_R r, given[2], given[3]
 #define DESIGN_VECTORS {number(0.0), number(0.0), number(0.0), number(0.0), number(0.0)}
 #define COLUMNS 5u
 #else
@@ -111,7 +114,7 @@ typedef double real;
 #define DESIGN_NEXT_R_GIVEN next_r
 #define DESIGN_R_AT_REST y
 #define DESIGN_R_IS_FINITE is_finite(r)
-#define DESIGN_SAMPLE_R samples[i][1]
+#define DESIGN_SAMPLE_R r
 #define DESIGN_VECTORS {number(0.0), number(0.0), number(0.0)}
 #define COLUMNS 3u
 #endif

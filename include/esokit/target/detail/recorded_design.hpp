@@ -4,11 +4,13 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <esokit/core/detail/compiled.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/target/detail/record_access.hpp>
 #include <esokit/target/detail/recorded_numbers.hpp>
+#include <esokit/target/detail/self_test.hpp>
 #include <esokit/target/detail/writable.hpp>
 #include <esokit/target/detail/written_names.hpp>
 #include <esokit/target/recorder.hpp>
@@ -379,40 +381,94 @@ class DesignRecorder {
   Recorder<Subject> recorder_;
 };
 
-/// Samples for the self-test: what y is does not matter. @param step gives the result for y and the
-/// `inputs` beside it, (u) or (r, ..)
-template <class V, int inputs = 1, class Step>
-std::vector<std::vector<double>> self_test_samples(int count, Step&& step) {
-  std::vector<std::vector<double>> samples;
-  for (int k = 0; k < count; ++k) {
-    const V y = static_cast<V>(0.25 * ((k * 37) % 16) - 1.5);
-    Vector<V, inputs> beside;
-    for (int i = 0; i < inputs; ++i) {
-      beside(i) = static_cast<V>(i == 0 ? ((k / 10) % 2 == 0 ? 1.0 : -0.5)
-                                        : 0.125 * ((k * 11 + i) % 9) - 0.5);
-    }
-    std::vector<double> sample{static_cast<double>(y)};
-    for (const V& one : beside) sample.push_back(static_cast<double>(one));
-    sample.push_back(static_cast<double>(step(y, beside)));
-    samples.push_back(std::move(sample));
+/// How many disturbances are measured.
+template <class O>
+constexpr int measured_inputs() {
+  if constexpr (requires { O::inputs; }) {
+    return O::inputs;
+  } else if constexpr (requires { typename O::Adapted; }) {
+    return measured_inputs<typename O::Adapted>();
+  } else {
+    return 0;
   }
-  return samples;
 }
 
-/// The self-test of a controller.
-template <class C>
+/// Gives measured disturbances, each the same. @return whether there are any
+template <class O, class Object, class V>
+bool give_measured(Object& object, V w) {
+  constexpr int count = measured_inputs<O>();
+  if constexpr (count == 1) {
+    object.measured(w);
+  } else if constexpr (count > 1) {
+    Vector<V, count> all{};
+    for (V& one : all) one = w;
+    object.measured(all);
+  }
+  return count > 0;
+}
+
+/// The self-test of a controller in one phase.
+template <int inputs, class C>
 void take_samples(RecordedDesign& design, C played) {
   using V = typename C::scalar_type;
-  const int count = design.options.self_test_samples;
-  if constexpr (requires { typename C::Reference; }) {
-    if (design.options.moving_reference) {
-      design.samples = self_test_samples<V, C::order + 1>(
-          count, [&](V y, const auto& motion) { return played.update(y, motion); });
-      return;
-    }
-  }
-  design.samples =
-      self_test_samples<V>(count, [&](V y, const auto& r) { return played.update(y, r(0)); });
+  const auto reference = [](const auto& beside) {
+    if constexpr (inputs == 1)
+      return beside(0);
+    else
+      return beside;
+  };
+  const double law =
+      design.law_gains.empty() ? 0 : std::abs(design.law_gains[0] / design.input_gain);
+  take_self_test<V, inputs>(
+      design, law,
+      [&](TestCall call, V y, const auto& beside, int row) {
+        if (call == TestCall::starts) (void)played.start(y, beside(0));
+        if (call == TestCall::reports) (void)played.applied(beside(0));
+        using Of = typename ObserverOfController<C>::type;
+        const bool given = call == TestCall::measures && give_measured<Of>(played, y);
+        if (given || call == TestCall::starts || call == TestCall::reports) {
+          return V(estimate_of(played.observer(), row));
+        }
+        if (call != TestCall::misses) return V(played.update(y, reference(beside)));
+        for (int left = static_cast<int>(y); left > 0; --left) {
+          (void)played.update_without_measurement(reference(beside));
+        }
+        return V(played.output());
+      },
+      [&](const auto&) { return played.output(); });
+}
+
+/// The self-test of a controller in two phases.
+template <int inputs, class C>
+void take_phases(RecordedDesign& design, C played) {
+  using V = typename C::scalar_type;
+  const auto next = [](const auto& beside) {
+    if constexpr (inputs == 1)
+      return beside(0);
+    else
+      return beside;
+  };
+  const double law = static_cast<double>(played.gains()[0]) / design.input_gain;
+  take_self_test<V, inputs>(
+      design, std::abs(law),
+      [&](TestCall call, V y, const auto& beside, int row) {
+        if (call == TestCall::starts) (void)played.start(y, beside(0));
+        if (call == TestCall::reports) (void)played.applied(beside(0));
+        if (call == TestCall::resets) (void)played.reset(y);
+        if (call == TestCall::starts || call == TestCall::reports || call == TestCall::resets) {
+          return V(estimate_of(played.observer(), row));
+        }
+        int left = call == TestCall::misses ? static_cast<int>(y) : 1;
+        V u{};
+        for (; left > 0; --left) {
+          const bool lost = call == TestCall::misses || call == TestCall::loses;
+          u = lost ? V(played.control_without_measurement()) : V(played.control(y));
+          if (call == TestCall::splits || call == TestCall::loses) (void)played.applied(beside(0));
+          (void)played.prepare(next(beside));
+        }
+        return u;
+      },
+      [&](const auto&) { return played.output(); });
 }
 
 /// Records the calls of a controller without its adapters, of which the design knows already.
@@ -512,7 +568,13 @@ Expected<RecordedDesign, Error<typename C::scalar_type>> recorded_design(
 
   if (auto ok = record_controller(maker); !ok) return ok.error();
   if (design.error_based) design.input_gain = -design.input_gain;
-  take_samples(design, controller);
+  if constexpr (takes_motion) {
+    if (options.moving_reference) {
+      take_samples<C::order + 1>(design, controller);
+      return design;
+    }
+  }
+  take_samples<1>(design, controller);
   return design;
 }
 
@@ -531,10 +593,21 @@ Expected<RecordedDesign, Error<typename Observer::scalar_type>> recorded_design(
   maker.design.law = RecordAccess::law_numbers(RecordAccess::core(bare));
   if (auto ok = maker.record(Itself{}, NoName{}); !ok) return ok.error();
   Observer played = observer;
-  maker.design.samples = self_test_samples<V>(options.self_test_samples, [&](V y, const auto& u) {
-    (void)played.update(y, u(0));
-    return played.total_disturbance();
-  });
+  take_self_test<V, 1>(
+      maker.design, 0,
+      [&](TestCall call, V y, const auto& u, int row) {
+        if (call == TestCall::misses) {
+          for (int left = static_cast<int>(y); left > 0; --left) (void)played.predict(u(0));
+        } else if (call == TestCall::starts || call == TestCall::resets) {
+          (void)played.reset(y);
+        } else if (call == TestCall::corrects) {
+          (void)played.correct(y);
+        } else if (call != TestCall::measures || !give_measured<Observer>(played, y)) {
+          (void)played.update(y, u(0));
+        }
+        return estimate_of(played, row);
+      },
+      [](const auto& u) { return u(0); });
   return maker.design;
 }
 
@@ -578,7 +651,11 @@ Expected<RecordedDesign, Error<typename C::scalar_type>> recorded_design(
     return at == &c.output() ? "u_last" : "";
   };
   if (auto ok = maker.record(OfPredictive{}, name_of); !ok) return ok.error();
-  take_samples(design, controller);
+  if (options.moving_reference) {
+    take_phases<C::order + 1>(design, controller);
+  } else {
+    take_phases<1>(design, controller);
+  }
   return design;
 }
 

@@ -211,6 +211,7 @@ struct RecordedDesign {
   bool predictive = false;                     ///< in two phases
   unsigned hold = 0;                           ///< of one of these: samples of its start hold
   std::vector<std::vector<double>> samples{};  ///< y, r or u, and the result
+  std::vector<unsigned> test_calls{};          ///< what of it is called, see self_test.hpp
 
   /// How many numbers the reference is.
   [[nodiscard]] int references() const { return options.moving_reference ? order + 1 : 1; }

@@ -176,6 +176,8 @@ class CDesign {
     text_.count("STATES", static_cast<std::size_t>(d.size));
     text_.count("ORDER", static_cast<std::size_t>(d.order));
     text_.constant("SAMPLES", std::to_string(d.samples.size()));
+    text_.constant("CALLS", std::to_string(d.test_calls.size()));
+    text_.count("CALL_LATER", of_row * static_cast<std::size_t>(d.order));
     text_.count("DIVIDER", static_cast<std::size_t>(d.loop.divider));
     text_.count("MISSING_LIMIT", d.loop.missing_limit);
     text_.constant("DESIGN_NUMBER", hash_.empty() ? "0u" : "0x" + hash_ + "u");
@@ -422,6 +424,8 @@ class CDesign {
     text_.replace("esokit_DESIGN_SET", options.name + "_" + options.settings_name);
     text_.replace("DESIGN_LAST", std::to_string(d.size - 1));
     text_.lines("DESIGN_VECTORS", writer_.rows(d.samples));
+    text_.replace("DESIGN_CALLS",
+                  listed(d.test_calls, [](unsigned call) { return std::to_string(call) + "u"; }));
   }
 
   /// What the reference is: r, or with its motion.
@@ -450,7 +454,7 @@ class CDesign {
                                           : "the reference");
     text_.constant("COLUMNS", std::to_string(names.size() + 2) + "u");
     text_.replace("DESIGN_SAMPLE_R", counted(d.references(), [](int i) {
-                    return "samples[i][" + std::to_string(i + 1) + "]";
+                    return i == 0 ? "r" : "given[" + std::to_string(i + 1) + "]";
                   }));
     text_.replace(
         "DESIGN_COLUMNS",
@@ -511,6 +515,7 @@ inline CCode c_texts(const RecordedDesign& design, const std::string& mark,
 /// Of all but its name, comment and self-test.
 inline std::uint32_t hash_of_texts(RecordedDesign design) {
   design.samples.clear();
+  design.test_calls.clear();
   design.options.comment = {};
   const CCode code = c_texts(design, "", "");
   return hash_of(code.header + code.source);

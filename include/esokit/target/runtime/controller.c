@@ -165,6 +165,9 @@ static real put_out(esokit_state *o, DESIGN_R)
 
 void esokit_init(esokit_state *o)
 {
+#if ESOKIT_SAVED
+  (void)memset(o, 0, sizeof *o); /* what lies between its members is saved, too */
+#endif
   DESIGN_INIT
 #if ESOKIT_DIVIDED
   o->phase = 0u;
@@ -397,6 +400,9 @@ bool esokit_adopt(esokit_state *o, const esokit_settings *settings)
 #elif !ESOKIT_PREDICTIVE
 void esokit_init(esokit_state *o)
 {
+#if ESOKIT_SAVED
+  (void)memset(o, 0, sizeof *o); /* what lies between its members is saved, too */
+#endif
   DESIGN_INIT
   up_to_date(o);
 }
@@ -468,8 +474,8 @@ void esokit_save(const esokit_state *o, esokit_saved *to)
 {
   to->design = DESIGN_NUMBER;
   to->size = (uint32_t)sizeof to->state;
-  to->state = *o;
-  to->crc = crc_of(&to->state); /* with what lies between its members */
+  (void)memcpy(&to->state, o, sizeof to->state); /* with what lies between its members */
+  to->crc = crc_of(&to->state);
 }
 
 /* Nothing of a sample is known but u. */
@@ -512,22 +518,127 @@ bool esokit_load(esokit_state *o, const esokit_saved *from, uint32_t samples, re
 
 #endif
 #ifdef ESOKIT_SELF_TEST
+/* What is called at a sample that is no update, whether a number is infinite, and which estimate is
+ * compared. */
+#define CALL_MISSES 1u
+#define CALL_STARTS 2u
+#define CALL_REPORTS 3u
+#define CALL_RESETS 4u
+#define CALL_CORRECTS 5u
+#define CALL_SPLITS 6u
+#define CALL_LOSES 7u
+#define CALL_MEASURES 8u
+#define CALL_KINDS 16u
+#define CALL_BAD_Y 16u
+#define CALL_BAD_BESIDE 32u
+#define CALL_ROW 64u
+
+#if ESOKIT_MEASURED
+static void measure_all(esokit_state *o, real w)
+{
+#if ESOKIT_ONE_W
+  esokit_measured(o, w);
+#else
+  real all[W_COUNT];
+  unsigned i;
+  for (i = 0u; i < W_COUNT; ++i) {
+    all[i] = w;
+  }
+  esokit_measured(o, all);
+#endif
+}
+
+#endif
+/* u, or an estimate where the call gives none. */
+static real called(esokit_state *o, unsigned call, const real given[COLUMNS])
+{
+  const unsigned kind = call % CALL_KINDS;
+  const unsigned row = call / CALL_ROW;
+  real y = given[0];
+  real r = given[1]; /* or u */
+  real result = 0.0;
+  unsigned left = 1u;
+  if ((call & CALL_BAD_Y) != 0u) {
+    y = y * LARGEST;
+  }
+  if ((call & CALL_BAD_BESIDE) != 0u) {
+    r = r * LARGEST;
+  }
+  if (kind == CALL_MISSES) {
+    left = (unsigned)given[0];
+  }
+#if ESOKIT_CONTROLLER || ESOKIT_PREDICTIVE
+  if (kind == CALL_STARTS) {
+    (void)esokit_start(o, y, r);
+    result = esokit_estimate(o, row);
+  } else if (kind == CALL_REPORTS) {
+    (void)esokit_applied(o, r);
+    result = esokit_estimate(o, row);
+#if ESOKIT_PREDICTIVE
+  } else if (kind == CALL_RESETS) {
+    (void)esokit_reset(o, y);
+    result = esokit_estimate(o, row);
+  } else if ((kind == CALL_MISSES) || (kind == CALL_LOSES)) {
+    while (left > 0u) {
+      result = esokit_control_without_measurement(o);
+      if (kind == CALL_LOSES) {
+        (void)esokit_applied(o, r);
+      }
+      (void)esokit_prepare(o, DESIGN_SAMPLE_R);
+      left = left - 1u;
+    }
+  } else if (kind == CALL_SPLITS) {
+    result = esokit_control(o, y);
+    (void)esokit_applied(o, r);
+    (void)esokit_prepare(o, DESIGN_SAMPLE_R);
+#else
+  } else if (kind == CALL_MISSES) {
+    while (left > 0u) {
+      result = esokit_update_without_measurement(o, DESIGN_SAMPLE_R);
+      left = left - 1u;
+    }
+#endif
+#if ESOKIT_MEASURED
+  } else if (kind == CALL_MEASURES) {
+    measure_all(o, y);
+    result = esokit_estimate(o, row);
+#endif
+  } else {
+    result = esokit_update(o, y, DESIGN_SAMPLE_R);
+  }
+#else
+  if (kind == CALL_MISSES) {
+    while (left > 0u) {
+      (void)esokit_predict(o, r);
+      left = left - 1u;
+    }
+  } else if ((kind == CALL_STARTS) || (kind == CALL_RESETS)) {
+    (void)esokit_reset(o, y);
+  } else if (kind == CALL_CORRECTS) {
+    (void)esokit_correct(o, y);
+#if ESOKIT_MEASURED
+  } else if (kind == CALL_MEASURES) {
+    measure_all(o, y);
+#endif
+  } else {
+    (void)esokit_update(o, y, r);
+  }
+  result = esokit_estimate(o, row);
+#endif
+  return result;
+}
+
 int esokit_self_test(real tolerance)
 {
   static const real samples[SAMPLES][COLUMNS] = { /* DESIGN_COLUMNS */
     DESIGN_VECTORS
   };
+  static const uint16_t calls[CALLS] = {DESIGN_CALLS};
   esokit_state o;
   int i;
   esokit_init(&o);
   for (i = 0; i < SAMPLES; ++i) {
-#if ESOKIT_CONTROLLER || ESOKIT_PREDICTIVE
-    const real result = esokit_update(&o, samples[i][0], DESIGN_SAMPLE_R);
-#else
-    real result;
-    (void)esokit_update(&o, samples[i][0], samples[i][1]);
-    result = esokit_estimate(&o, ORDER);
-#endif
+    const real result = called(&o, (i < CALLS) ? calls[i] : CALL_LATER, samples[i]);
     if (!(fabs(result - samples[i][COLUMNS - 1u]) <= tolerance)) {
       return i + 1;
     }

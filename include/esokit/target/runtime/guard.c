@@ -131,10 +131,11 @@ static unsigned predict_standing(esokit_state *o, real u)
 static unsigned correct_standing(esokit_state *o, real y)
 {
   real before[LEVELS];
+  const bool overdue = is_overdue(o);
   const unsigned elapsed = (o->gap > 1u) ? o->gap : 1u;
   real left = 1.0;
   unsigned status;
-  if (!is_overdue(o)) {
+  if (!overdue) {
     left = 1.0 - gains_of[elapsed - 1u][0];
   }
   get_disturbance(o, before);

@@ -22,10 +22,13 @@ static void up_to_date(esokit_state *o)
 /* The next y restarts. */
 static bool is_overdue(const esokit_state *o)
 {
+  if (o->gap > ROWS) {
+    return true;
+  }
 #if ESOKIT_RECOVERS
-  return (o->gap > ROWS) || ((o->due != 0u) && (o->gap > BRIDGED));
+  return (o->due != 0u) && (o->gap > BRIDGED);
 #else
-  return o->gap > ROWS;
+  return false;
 #endif
 }
 
@@ -108,8 +111,9 @@ static unsigned predict_plain(esokit_state *o, real given)
 static unsigned correct_plain(esokit_state *o, real y)
 {
   unsigned status = ESOKIT_MEASUREMENT_REJECTED;
+  const bool overdue = is_overdue(o);
   const unsigned elapsed = (o->gap > 1u) ? o->gap : 1u;
-  if (is_overdue(o)) {
+  if (overdue) {
     if (restart_plain(o, y)) {
       status = ESOKIT_RESTARTED;
     }

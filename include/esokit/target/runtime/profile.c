@@ -101,7 +101,7 @@ bool esokit_update(esokit_state *o, real target)
   if (good && !esokit_moves(o)) {
     good = plan(o, target);
   }
-  if (esokit_moves(o)) {
+  if (o->sample < o->samples) {
     o->sample = o->sample + 1;
   }
   return good;

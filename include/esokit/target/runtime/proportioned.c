@@ -72,8 +72,9 @@ bool esokit_update(esokit_state *o, real u)
     plan(o, u);
   }
   is_on = o->sample < o->on_samples;
-  o->sample = o->sample + 1;
-  if (o->sample == WINDOW) {
+  if (o->sample < (WINDOW - 1)) {
+    o->sample = o->sample + 1;
+  } else {
     o->sample = 0;
   }
   return is_on;

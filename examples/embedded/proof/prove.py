@@ -1,0 +1,222 @@
+#!/usr/bin/env python3
+"""Proves written C with Frama-C's Eva: see prove.sh, which calls it.
+
+    prove.py FOLDER [--few] [--write] [NAME ...]
+
+FOLDER has kinds.tsv (name, title, least and largest u) and the C of each kind in a folder of its name.
+From its header a driver is made: it calls every function for ever, in any order, each time with any
+numbers, infinite ones and NaN too. Eva looks at all executions of it at once. What has to hold: no alarm
+(undefined behaviour), u within its limits, each number of the state finite after every call. Then C
+that was broken is to be refused. The table of README.md is compared, but for the seconds, or written.
+"""
+
+import os
+import re
+import resource
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+PAGE = Path(__file__).resolve().parents[1] / "README.md"
+BEGIN, END = "<!-- proofs: written by prove.sh -->\n", "<!-- end of proofs -->"
+SECONDS = 300  # of the processor, for each proof
+
+# Enough for a change of the C: the plain controller, one with all counts, an output.
+FEW = ("plain", "gated", "profile", "proportioned")
+# What is done to the plain controller, and what may then hold no longer.
+BROKEN = (
+    ("a limit one higher", "7.0f < t1", "8.0f < t1", "u_within"),
+    ("a clip left out", "(7.0f < t1) ? 7.0f : t1", "t1", "u_within"),
+    ("a row too far", "row = elapsed - 1u", "row = elapsed", "alarms"),
+    ("a check left out", "  if (!is_finite(u)) {\n    return PLAIN_INPUT_REJECTED;\n  }\n  if (o->",
+     "  if (o->", "finite_u_last"),
+)
+
+ANY = {"float": "any_float", "double": "any_double", "unsigned": "any_unsigned", "uint8_t": "any_8",
+       "uint16_t": "any_16", "uint32_t": "any_32", "bool": "any_bool"}
+HEAD = """#include "{name}.h"
+#include <stdbool.h>
+volatile float any_float;
+volatile double any_double;
+volatile unsigned any_unsigned;
+volatile uint8_t any_8;
+volatile uint16_t any_16;
+volatile uint32_t any_32;
+volatile bool any_bool;
+
+int main(void)
+{{
+  {name}_state o;
+"""
+
+
+class Header:
+    """What a driver needs of a header that to_c wrote."""
+
+    def __init__(self, name, text):
+        self.name = name
+        text = re.sub(r"/\*.*?\*/", "", text, flags=re.S)
+        text = re.sub(r"#ifdef \w+_SELF_TEST.*?#endif", "", text, flags=re.S)
+        self.structs = {
+            struct: re.findall(r"^ +(\w+) (\w+)(?:\[(\d+)u?\])?;", body, re.M)
+            for body, struct in re.findall(r"typedef struct \{(.*?)\} (\w+);", text, re.S)}
+        self.settings = re.findall(r"^extern const \w+ (\w+);", text, re.M)
+        self.functions = re.findall(r"^(\w+) (\w+)\(([^)]*)\);", text, re.M)
+
+    def has(self, part):
+        return f"{self.name}_{part}" in self.structs
+
+    def numbers(self, struct, path):
+        """The floating-point numbers of an object, but for those that keep what came, unseen."""
+        for kind, member, length in self.structs.get(struct, ()):
+            for at in [f"[{i}]" for i in range(int(length))] if length else [""]:
+                place = f"{path}.{member}{at}"
+                if kind not in ("float", "double"):
+                    yield from self.numbers(kind, place)
+                elif member not in ("given", "measurement"):
+                    yield place
+
+    def call(self, result, function, arguments, limits):
+        """The lines of one call with any numbers."""
+        own, given, lines, checks = function[len(self.name) + 1:], [], [], []
+        for argument in arguments.split(","):
+            kind = argument.replace("const ", "").split()[0]
+            length = re.search(r"\[(\d+)u?\]", argument)
+            part = kind[len(self.name) + 1:]
+            if part in ("state", "settings", "saved"):
+                objects = {"state": "o", "settings": "".join(self.settings), "saved": "saved"}
+                given.append("&" + objects[part])
+            elif part == "sample":
+                lines += [f"{kind} sample;"]
+                lines += [f"sample.{member} = {ANY[its]};" for its, member, _ in self.structs[kind]]
+                given.append("&sample")
+            elif length:
+                many = range(int(length.group(1)))
+                lines.append(f"{kind} many[{len(many)}];")
+                if "const" in argument:
+                    lines += [f"many[{i}] = {ANY[kind]};" for i in many]
+                given.append("many")
+            else:
+                given.append(ANY[kind])
+        call = f"{function}({', '.join(given)});"
+        if result in ("float", "double") and own != "estimate":
+            low, high = limits
+            lines.append(f"{result} u = {call}")
+            if low != "-":
+                checks = [f"/*@ assert u_within: {low} <= u <= {high}; */"]
+        else:
+            lines.append(call if result == "void" else "(void)" + call)
+        return lines + checks
+
+    def driver(self, limits):
+        text = HEAD.format(name=self.name)
+        names = [function[len(self.name) + 1:] for _, function, _ in self.functions]
+        first = next(one for one in ("init", "clear", "reset") if one in names)
+        text += "".join(f"  {self.name}_saved saved;\n" for _ in [0] if self.has("saved"))
+        alone = dict(zip(names, self.functions))[first][2].count(",") == 0
+        text += f"  (void){self.name}_{first}(&o{'' if alone else ', 0'});\n"
+        text += "".join(f"  {self.name}_save(&o, &saved);\n" for _ in [0] if self.has("saved"))
+        text += "  for (;;) {\n    switch (any_unsigned) {\n"
+        for i, function in enumerate(self.functions):
+            label = f"case {i}" if i + 1 < len(self.functions) else "default"
+            lines = [f"    {label}: {{"] + ["      " + one for one in self.call(*function, limits)]
+            text += "\n".join(lines) + "\n      break;\n    }\n"
+        text += "    }\n"
+        for place in self.numbers(f"{self.name}_state", "o"):
+            text += f"    /*@ assert finite_{re.split('[.[]', place)[1]}: \\is_finite({place}); */\n"
+        return text + "  }\n}\n"
+
+
+def limited():
+    resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
+
+
+def used():
+    return resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+
+
+def proven(at, name, limits, source=None):
+    """{what: text of a cell} of one kind."""
+    at.mkdir(exist_ok=True)
+    header = (at / f"{name}.h").read_text()
+    driver = Header(name, header).driver(limits)
+    (at / "driver.c").write_text(driver)
+    if source is not None:
+        (at / f"{name}.c").write_text(source)
+    started = used()
+    command = ["frama-c", "-eva", "-eva-precision", "5", "-warn-special-float", "none",
+               "-eva-msg-key=-final-states,-initial-state", "driver.c", f"{name}.c"]
+    run = subprocess.run(command, cwd=at, env={**os.environ, "PWD": str(at)}, text=True, check=False,
+                         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, preexec_fn=limited)
+    (at / "log.txt").write_text(run.stdout)
+    alarms = re.search(r"(\d+) alarms? generated", run.stdout)
+    if run.returncode == -signal.SIGXCPU:
+        return {"alarms": "not proven", "u": "", "states": "", "seconds": f"above {SECONDS}",
+                "failed": {"time"}}
+    if run.returncode != 0 or not alarms:
+        sys.exit(run.stdout[-2000:])
+    failed = set(re.findall(r"assertion '(\w+)' got status", run.stdout))
+    reached = re.search(r"Assertions +\d+ valid.* (\d+) total", run.stdout)
+    if not reached or int(reached.group(1)) != driver.count("assert"):
+        failed |= {"u_within", "finite_all"}  # as execution ends before some of them
+    unseen = ", ".join(sorted(one[7:] for one in failed if one.startswith("finite_")))
+    low, high = limits
+    return {"alarms": alarms.group(1),
+            "u": "not proven" if "u_within" in failed else f"{low} .. {high}" if low != "-" else "",
+            "states": f"not proven: {unseen}" if unseen else "finite",
+            "seconds": f"{used() - started:.0f}",
+            "failed": failed | ({"alarms"} if alarms.group(1) != "0" else set())}
+
+
+def rows_of(page):
+    """{title: cells} of the table of the page."""
+    table = page[page.index(BEGIN) + len(BEGIN):page.index(END)]
+    rows = [[cell.strip() for cell in line.strip("| \n").split(" | ")] for line in table.splitlines()]
+    return {row[0]: row for row in rows if len(row) == 5}
+
+
+def write_table(rows):
+    page = PAGE.read_text()
+    table = [["kind", "alarms", "u", "states", "seconds"], ["---", "---:", "---", "---", "---:"]] + rows
+    text = "".join("| " + " | ".join(row) + " |\n" for row in table)
+    PAGE.write_text(page[:page.index(BEGIN) + len(BEGIN)] + "\n" + text + "\n" + page[page.index(END):])
+
+
+def main():
+    arguments = sys.argv[1:]
+    few, write = "--few" in arguments, "--write" in arguments
+    folder, *names = [one for one in arguments if not one.startswith("--")]
+    folder = Path(folder).resolve()
+    kinds = [line.split("\t") for line in (folder / "kinds.tsv").read_text().splitlines()]
+    page = PAGE.read_text()
+    rows, passed, failed = rows_of(page), 0, 0
+    for name, title, *limits in kinds:
+        if names and name not in names or few and name not in FEW:
+            continue
+        result = proven(folder / name, name, limits)
+        row = [title] + [result[cell] for cell in ("alarms", "u", "states", "seconds")]
+        print("|", " | ".join(row), "|", *sorted(result["failed"]), flush=True)
+        good = write or row[:4] == rows.get(title, [])[:4]
+        rows[title] = row
+        passed, failed = passed + good, failed + (not good)
+        if not good:
+            print(f"FAILED {title}: the page says otherwise")
+        if write:
+            write_table([rows[title] for _, title, *_ in kinds if title in rows])
+    plain = dict((name, limits) for name, _, *limits in kinds)["plain"]
+    source = (folder / "plain" / "plain.c").read_text()
+    for number, (title, old, new, what) in enumerate(() if names else BROKEN):
+        at = folder / f"broken{number}"
+        at.mkdir(exist_ok=True)
+        (at / "plain.h").write_text((folder / "plain" / "plain.h").read_text())
+        broken = source.replace(old, new)
+        refused = source.count(old) == 1 and what in proven(at, "plain", plain, broken)["failed"]
+        print("ok     refused:" if refused else "FAILED not refused:", title, flush=True)
+        passed, failed = passed + refused, failed + (not refused)
+    print(f"{passed} passed, {failed} failed")
+    return failed > 0 or passed == 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,163 @@
+// Writes the C of each kind that prove.sh proves: NAME.[hc] into a folder NAME of the folder that
+// is given. Prints of each NAME, what it is, and between which limits u has to stay.
+#include <cstdio>
+#include <esokit/adapter/delayed_input.hpp>
+#include <esokit/adapter/mapped_input.hpp>
+#include <esokit/adapter/measured.hpp>
+#include <esokit/adapter/outlier_gate.hpp>
+#include <esokit/adapter/wrapped_output.hpp>
+#include <esokit/control/adrc.hpp>
+#include <esokit/control/smooth_profile.hpp>
+#include <esokit/control/time_proportioned.hpp>
+#include <esokit/observer/linear_eso.hpp>
+#include <esokit/target/c_code.hpp>
+#include <esokit/target/profile_code.hpp>
+#include <esokit/target/time_proportioned_code.hpp>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+namespace {
+
+using namespace esokit;
+
+std::string folder;
+bool all_written = true;
+
+/// @param limits of u, or "- -"
+template <class Made, class... As>
+void write_as(const std::string& name, const std::string& title, const std::string& limits,
+              CodeOptions options, const Made& made, const As&... as) {
+  options.name = name;
+  options.self_test_samples = 1;
+  if (!made) {
+    std::fprintf(stderr, "%s: %s %s\n", name.c_str(), made.error().field, made.error().rule);
+    all_written = false;
+    return;
+  }
+  const auto code = to_c(*made, as..., options);
+  if (!code) {
+    std::fprintf(stderr, "%s: %s %s\n", name.c_str(), code.error().field, code.error().rule);
+    all_written = false;
+    return;
+  }
+  const std::string at = folder + "/" + name;
+  std::filesystem::create_directories(at);
+  std::ofstream(at + "/" + name + ".h") << code->header;
+  std::ofstream(at + "/" + name + ".c") << code->source;
+  std::printf("%s\t%s\t%s\n", name.c_str(), title.c_str(), limits.c_str());
+}
+
+constexpr const char* no_limits = "-\t-";
+
+template <class V>
+Limits<V> limits_of_u() {
+  return {.lower = V(-2), .upper = V(7)};
+}
+
+template <class Observer>
+auto observer_of() {
+  using V = typename Observer::scalar_type;
+  typename Observer::Config config{};
+  if constexpr (requires { config.observer; }) {
+    config.observer = observer_of<typename Observer::Adapted>();
+    if constexpr (requires { config.delay; }) config.delay = 4;
+    if constexpr (requires { config.threshold; }) config.threshold = V(0.05);
+    if constexpr (requires { config.period; }) config.period = V(6.2831853);
+    if constexpr (requires { config.inputs; }) config.inputs[0] = {V(-3), V(0.003), V(0.002)};
+    if constexpr (requires { config.curve; }) {
+      config.curve = decltype(config.curve)::dead_zone(V(0.5), V(0.25));
+    }
+  } else {
+    config.observer_bandwidth = V(100);
+    config.input_gain = V(50);
+    config.sample_time = V(1e-3);
+    config.max_gap = 3;
+  }
+  return config;
+}
+
+template <class C>
+typename C::Config config_of() {
+  using V = typename C::scalar_type;
+  typename C::Config config{};
+  config.observer = observer_of<typename detail::ObserverOfController<C>::type>();
+  if constexpr (requires { config.controller_bandwidth; }) config.controller_bandwidth = V(15);
+  config.limits = limits_of_u<V>();
+  return config;
+}
+
+template <class C, class Change = void (*)(typename C::Config&)>
+void write_controller(
+    const std::string& name, const std::string& title, CodeOptions options = {},
+    Change change = [](typename C::Config&) {}) {
+  auto config = config_of<C>();
+  change(config);
+  write_as(name, title, "-2\t7", options, C::make(config));
+}
+
+template <class Observer>
+void write_observer(const std::string& name, const std::string& title) {
+  write_as(name, title, no_limits, {}, Observer::make(observer_of<Observer>()));
+}
+
+void holds_and_ramps(auto& config) {
+  config.limits.rate = 500;
+  config.start_hold = {.time = decltype(config.start_hold.time)(0.1)};
+}
+
+void write_controllers() {
+  using Plain = Adrc<LinearEso<2, float>>;
+  using Double = Adrc<LinearEso<2, double>>;
+  write_controller<Plain>("plain", "`Adrc<LinearEso<2, float>>`");
+  write_controller<Double>("in_double", "`Adrc<LinearEso<2>>`");
+  write_controller<Plain>("ramp", "the first, limit of rate and start hold", {},
+                          [](auto& config) { holds_and_ramps(config); });
+  write_controller<Double>("ramp_in_double", "the second, limit of rate and start hold", {},
+                           [](auto& config) { holds_and_ramps(config); });
+  write_controller<Plain>("divided", "the first, y at every third sample", {},
+                          [](auto& config) { config.measurement_divider = 3; });
+  write_controller<Adrc<LinearEso<2, float>, ErrorBased>>("error_based", "its error-based form");
+  write_controller<Plain>("moving", "the first, with r' and r''", {.moving_reference = true});
+  write_controller<Plain>("saved", "the first, state kept over a restart", {.saves_state = true});
+  write_controller<Plain>("settings", "the first, settings in a struct",
+                          {.settings_in_struct = true});
+  write_controller<Plain>("watched", "the first, with what a monitor reads", {.watched = true});
+}
+
+void write_adapters() {
+  write_controller<Adrc<DelayedInput<LinearEso<2, float>, 4>>>("delayed", "`DelayedInput` in it");
+  write_controller<Adrc<OutlierGate<LinearEso<2, float>>>>("gated", "`OutlierGate`");
+  write_controller<Adrc<DelayedInput<OutlierGate<LinearEso<2>>, 4>>>(
+      "all_in_double", "both, in double, limit of rate and start hold", {},
+      [](auto& config) { holds_and_ramps(config); });
+  write_controller<Adrc<WrappedOutput<LinearEso<2, float>>>>("angle", "`WrappedOutput`");
+  write_controller<Adrc<Measured<LinearEso<2, float>, 1, 8>>>("measured", "`Measured`");
+  write_controller<Adrc<MappedInput<LinearEso<2, float>, 3>>>("mapped", "`MappedInput`");
+  write_observer<LinearEso<2, float>>("observer", "`LinearEso<2, float>` alone");
+}
+
+void write_others() {
+  SmoothProfileConfig<2, float> profile{.sample_time = 0.004f};
+  profile.limits = {3.0f, 20.0f};
+  write_as("profile", "`SmoothProfile<2, float>`", no_limits, {},
+           SmoothProfile<2, float>::make(profile));
+  write_as("proportioned", "`TimeProportioned<float>`", "0\t1", {},
+           TimeProportioned<float>::make({.off = 0.0f,
+                                          .on = 1.0f,
+                                          .window = 10.0f,
+                                          .least_on = 1.0f,
+                                          .least_off = 1.0f,
+                                          .sample_time = 0.1f}));
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 2) return 2;
+  folder = argv[1];
+  write_controllers();
+  write_adapters();
+  write_others();
+  return all_written ? 0 : 1;
+}

@@ -1,0 +1,186 @@
+/// @file
+/// The self-test of written C: what is called at each sample, and what the design gives then.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <esokit/core/detail/unroll.hpp>
+#include <esokit/core/matrix.hpp>
+#include <esokit/target/detail/recorded_numbers.hpp>
+#include <limits>
+#include <utility>
+#include <vector>
+
+namespace esokit::detail {
+
+/// What the self-test calls, as in runtime/controller.c.
+enum class TestCall : unsigned {
+  update,   ///< with y, and r or u beside it
+  misses,   ///< y times a sample without a measurement
+  starts,   ///< under u
+  reports,  ///< the u that acts
+  resets,
+  corrects,  ///< of an observer
+  splits,    ///< the two phases, with a report between them
+  loses,     ///< the same without a measurement
+  measures   ///< a disturbance w
+};
+
+inline constexpr unsigned bad_y = 16;       ///< y is infinite
+inline constexpr unsigned bad_beside = 32;  ///< what stands beside it is
+
+inline constexpr int most_calls = 80;  ///< samples with one; after them there are plain updates
+
+inline constexpr unsigned of_row = 64;  ///< times the number of the estimate that is compared
+
+/// One call of it, with numbers in place of what a loop has at that sample, where they are one.
+struct PlannedCall {
+  int sample;
+  TestCall call;
+  unsigned bad = 0;
+  double y = std::numeric_limits<double>::quiet_NaN();
+  double beside = std::numeric_limits<double>::quiet_NaN();  ///< r or u
+};
+
+/// What the calls of a self-test depend on.
+struct TestNumbers {
+  unsigned longest;  ///< gap that has a gain, samples
+  unsigned limit;    ///< of missing measurements, samples
+  double largest;    ///< number
+  double huge;       ///< u, which a start still takes
+  double step;       ///< of r
+};
+
+/// The calls that are no plain update: gaps that are bridged, that restart and that end in safe
+/// mode, bad numbers, starts and reports, each followed by plain updates.
+inline PlannedCall planned(int sample, const TestNumbers& of) {
+  const auto many = [](unsigned samples) {
+    return static_cast<double>((std::min)((std::max)(samples, 1U), 1000U));
+  };
+  const std::array all{
+      PlannedCall{.sample = 20, .call = TestCall::update, .beside = 20 * of.step},
+      PlannedCall{.sample = 21, .call = TestCall::update, .beside = -20 * of.step},
+      PlannedCall{22, TestCall::update, bad_y, 4},
+      PlannedCall{24, TestCall::update, bad_y, 4},
+      PlannedCall{25, TestCall::update, bad_y, 4},
+      PlannedCall{.sample = 27, .call = TestCall::update, .bad = bad_beside, .beside = 4},
+      PlannedCall{29, TestCall::misses, 0, 1},
+      PlannedCall{31, TestCall::misses, 0, many(of.longest - 1)},
+      PlannedCall{33, TestCall::misses, 0, many(of.longest + 1)},
+      PlannedCall{34, TestCall::update, bad_y, 4},
+      PlannedCall{36, TestCall::misses, 0, many(of.limit)},
+      PlannedCall{.sample = 40, .call = TestCall::starts, .beside = 0},
+      PlannedCall{43, TestCall::starts, bad_y, 4, 0},
+      PlannedCall{.sample = 44, .call = TestCall::starts, .bad = bad_beside, .beside = 4},
+      PlannedCall{.sample = 45, .call = TestCall::starts, .beside = of.largest},
+      PlannedCall{.sample = 47, .call = TestCall::reports, .bad = bad_beside, .beside = 4},
+      PlannedCall{49, TestCall::splits},
+      PlannedCall{51, TestCall::loses},
+      PlannedCall{53, TestCall::misses, 0, 1},
+      PlannedCall{54, TestCall::corrects},
+      PlannedCall{55, TestCall::measures, 0, 0.125},
+      PlannedCall{58, TestCall::measures, bad_y, 4},
+      PlannedCall{60, TestCall::resets},
+      PlannedCall{62, TestCall::resets, bad_y, 4},
+      PlannedCall{64, TestCall::update, 0, of.largest},
+      // A state near the end of the numbers, from which even a small u leads beyond.
+      PlannedCall{66, TestCall::starts, 0, of.largest, 0},
+      PlannedCall{.sample = 67, .call = TestCall::reports, .beside = of.largest},
+      PlannedCall{.sample = 70, .call = TestCall::reports, .beside = -of.huge},
+      PlannedCall{71, TestCall::starts, 0, of.largest, -of.huge},
+      PlannedCall{72, TestCall::reports, bad_y, 4, of.huge},
+      PlannedCall{73, TestCall::update, bad_y, 4},
+      PlannedCall{.sample = 76, .call = TestCall::starts, .beside = 0},
+  };
+  const auto* const found =
+      std::find_if(all.begin(), all.end(), [=](const auto& one) { return one.sample == sample; });
+  return found == all.end() ? PlannedCall{sample, TestCall::update} : *found;
+}
+
+/// The plant of the design, exact for a u that is held: y^(n) = b0 u.
+class TestPlant {
+ public:
+  TestPlant(int order, double input_gain, double sample_time)
+      : states_(static_cast<std::size_t>(order)), gain_(input_gain), step_(sample_time) {}
+  [[nodiscard]] double output() const { return states_[0]; }
+  void advance(double u) {
+    if (!(std::abs(u) < 1e6)) return;
+    for (std::size_t i = 0; i < states_.size(); ++i) {
+      double power = 1;
+      for (std::size_t k = i + 1; k <= states_.size(); ++k) {
+        power *= step_ / static_cast<double>(k - i);
+        states_[i] += power * (k < states_.size() ? states_[k] : gain_ * u);
+      }
+    }
+  }
+  void rest() { std::fill(states_.begin() + 1, states_.end(), 0.0); }
+
+ private:
+  std::vector<double> states_;
+  double gain_, step_;
+};
+
+/// An estimate by its row.
+template <class Observer>
+auto estimate_of(const Observer& observer, int row) {
+  typename Observer::scalar_type found(0);
+  unroll<Observer::size>([&](auto at) {
+    constexpr int place{decltype(at)::value};
+    if (row == place) found = observer.template estimate<place>();
+  });
+  return found;
+}
+
+/// The samples of a self-test.
+/// @tparam V their scalar @tparam inputs beside y: (u) or (r, r', ..)
+/// @param law the gain of the law, u per r, or 0 @param calls gives u or an estimate for a call, y,
+/// what is beside it and a row @param output the u that moves the plant then
+template <class V, int inputs, class Calls, class Output>
+void take_self_test(RecordedDesign& design, double law, Calls&& calls, Output&& output) {
+  constexpr V largest = (std::numeric_limits<V>::max)();
+  const double room = (std::min)(std::abs(design.lower), std::abs(design.upper));
+  const double size = law > 0 && room < 1e6 ? 0.3 * room / law : 1;
+  const auto most = static_cast<double>(largest);
+  const TestNumbers numbers{
+      .longest = static_cast<unsigned>((std::max)(design.gap_gains.size(), std::size_t{1})),
+      .limit = design.loop.missing_limit,
+      .largest = most,
+      .huge = 0.25 * most / (std::max)(1.0, std::abs(design.input_gain)),
+      .step = size};
+  TestPlant plant(design.order, design.input_gain, design.sample_time);
+  for (int k = 0; k < design.options.self_test_samples; ++k) {
+    PlannedCall plan = planned(k, numbers);
+    // Each estimate once, with a report.
+    int row = (k - 4) / 2;
+    if (4 <= k && k % 2 == 0 && row < (std::min)(design.size, 8)) {
+      plan.call = TestCall::reports;
+    } else {
+      row = design.order;
+    }
+    if (std::isnan(plan.y)) plan.y = plant.output();
+    V y = static_cast<V>(plan.y);
+    Vector<V, inputs> beside;
+    for (int i = 1; i < inputs; ++i) {
+      beside(i) = static_cast<V>(size * (0.125 * ((k * 11 + i) % 9) - 0.5));
+    }
+    beside(0) = static_cast<V>(!std::isnan(plan.beside) ? plan.beside
+                               : (k / 10) % 2 == 0      ? size
+                                                        : -0.5 * size);
+    std::vector<double> sample{static_cast<double>(y)};
+    for (const V& one : beside) sample.push_back(static_cast<double>(one));
+    if ((plan.bad & bad_y) != 0) y = y * largest;
+    if ((plan.bad & bad_beside) != 0) beside(0) = beside(0) * largest;
+    sample.push_back(static_cast<double>(calls(plan.call, y, beside, row)));
+    design.samples.push_back(std::move(sample));
+    if (k < most_calls) {
+      design.test_calls.push_back(static_cast<unsigned>(plan.call) + plan.bad +
+                                  of_row * static_cast<unsigned>(row));
+    }
+    if (plan.call == TestCall::starts) plant.rest();
+    plant.advance(static_cast<double>(output(beside)));
+  }
+}
+
+}  // namespace esokit::detail
