@@ -18,7 +18,7 @@ set(esokit_units
     "examples/algebraic_filter examples/clock examples/sign_differentiator"
     "gain/algebraic_gain gain/riccati gain/sampled_gain"
     "gain/continuous_gain gain/covariance_factor gain/feedback_gain gain/gain_interval gain/gain_law gain/gain_law_static gain/switching_certificate"
-    "identify/fit identify/identify identify/input_checks identify/late_input identify/measured_columns identify/second_opinion"
+    "identify/fit identify/identify identify/input_checks identify/late_input identify/measured_columns identify/second_opinion identify/smooth"
     "math/combinatorics math/fal math/positivity"
     "model/augmented_model model/linear_plant model/plant_model"
     "observer/absurd_numbers observer/adjustable_bandwidth_eso observer/given_values observer/reconvergence"

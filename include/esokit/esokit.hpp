@@ -129,6 +129,7 @@
 #include <esokit/identify/second_opinion.hpp>
 #include <esokit/identify/seen_curve.hpp>
 #include <esokit/identify/sinusoids.hpp>
+#include <esokit/identify/smooth.hpp>
 #include <esokit/identify/spectrum.hpp>
 #include <esokit/math/combinatorics.hpp>
 #include <esokit/math/detail/dense.hpp>

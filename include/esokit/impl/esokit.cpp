@@ -37,6 +37,7 @@
 #include <esokit/identify/impl/second_opinion.ipp>
 #include <esokit/identify/impl/seen_curve.ipp>
 #include <esokit/identify/impl/sinusoids.ipp>
+#include <esokit/identify/impl/smooth.ipp>
 #include <esokit/identify/impl/spectrum.ipp>
 #include <esokit/identify/impl/timed_column.ipp>
 #include <esokit/sim/impl/statistics.ipp>
