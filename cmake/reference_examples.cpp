@@ -299,6 +299,19 @@ void approach_profile() {
   (void)motion;
 }
 
+void resting() {
+  //! [Resting]
+  constexpr double count = 0.0015;  // of the encoder
+  auto controller = Resting<Adrc<LinearEso<2>>>::make(
+                        {.controller = adrc, .rest = {.error = 1.5 * count, .time = 0.5}})
+                        .value();
+  const double u = controller.update(read_y(), read_r());
+  const bool held = controller.mode() == LoopMode::rest;
+  //! [Resting]
+  apply(u);
+  (void)held;
+}
+
 void time_proportioned() {
   //! [TimeProportioned]
   auto relay = TimeProportioned<>::make(
@@ -420,6 +433,7 @@ int main() {
   tracking_differentiator();
   smooth_profile();
   approach_profile();
+  resting();
   time_proportioned();
   health_monitor();
   gain_probe();

@@ -24,6 +24,7 @@
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/analysis/integrator_chain.hpp>
 #include <esokit/control/adrc.hpp>
+#include <esokit/control/resting.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>
@@ -365,6 +366,71 @@ void pause(Report& report) {
   report.add(figure);
 }
 
+// ---- stiction and an encoder
+
+constexpr double encoder_count = 2 * 3.14159265358979324 / 4096;
+
+struct Hunt {
+  std::vector<double> t, error, input;
+  double way = 0;  ///< counts gone in the last 10 s
+};
+
+/// y'' = 50 u minus friction: it sticks up to 60 rad/s2, and brakes with 20 rad/s2 once it moves.
+Hunt hunt(const esokit::Rest<double>& rest) {
+  constexpr double r = 0.9995, stick = 60, coulomb = 20, viscous = 3, b0 = 50;
+  constexpr int parts = 20;
+  auto controller = esokit::Resting<esokit::Adrc<Linear>>::make(
+                        {.controller = {.observer = linear(150, b0),
+                                        .controller_bandwidth = 20,
+                                        .limits = {.lower = -12, .upper = 12}},
+                         .rest = rest})
+                        .value();
+  Hunt run;
+  double x = 0, v = 0;
+  for (int k = 0; k < 20000; ++k) {
+    const double u = controller.update(encoder_count * std::round(x / encoder_count), r);
+    const double before = x;
+    for (int i = 0; i < parts; ++i) {
+      const bool stands = !(std::abs(v) > 0);
+      if (stands && std::abs(b0 * u) <= stick) continue;
+      const double sign = std::copysign(1.0, stands ? u : v);
+      const double next = v + sample_time / parts * (b0 * u - coulomb * sign - viscous * v);
+      v = v * next < 0 ? 0 : next;
+      x += sample_time / parts * v;
+    }
+    if (k < 10000) continue;
+    run.way += std::abs(x - before) / encoder_count;
+    run.t.push_back(k * sample_time);
+    run.error.push_back((r - x) / encoder_count);
+    run.input.push_back(u);
+  }
+  return run;
+}
+
+void rests(Report& report) {
+  const Hunt plain = hunt({}), resting = hunt({.error = 1.5 * encoder_count, .time = 0.25});
+  report.expect("stiction and an encoder", "counts gone in 10 s at a reference that stands",
+                plain.way, plain.way > 100, "above 100");
+  report.expect("stiction and an encoder, rest", "counts gone in 10 s at a reference that stands",
+                resting.way, resting.way < 1e-9, "0");
+  Figure figure("rest", {.rows = 2, .columns = 1, .panel_height = 150});
+  figure.caption(
+      "An axis with stiction and an encoder at a reference that stands: without rest a "
+      "limit cycle, with it the loop holds u.");
+  auto& errors = figure.panel(0, 0).y_label("r - y (counts)").legend(Legend::above).x_range(10, 20);
+  auto& inputs = figure.panel(1, 0).x_label("t (s)").y_label("u (V)").x_range(10, 20);
+  errors.name("error");
+  inputs.name("input");
+  const auto draw = [&](const Hunt& run, Style style) {
+    errors.line(run.t, run.error, style);
+    style.name.clear();
+    inputs.line(run.t, run.input, style);
+  };
+  draw(plain, {.name = "Adrc", .color = Color::vermillion, .width = 1.3});
+  draw(resting, {.name = "rest", .color = Color::blue, .width = 2.4});
+  report.add(figure);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -445,5 +511,6 @@ int main(int argc, char** argv) {
                "error in 1e-3, mean (standard deviation) over 20 seeds",
                {"case", "RMS error", "ratio"}, rows);
   pause(report);
+  rests(report);
   return report.finish();
 }

@@ -55,6 +55,7 @@
 #include <esokit/control/nonlinear_feedback.hpp>
 #include <esokit/control/predictive_adrc.hpp>
 #include <esokit/control/reference.hpp>
+#include <esokit/control/resting.hpp>
 #include <esokit/control/smooth_profile.hpp>
 #include <esokit/control/telemetry.hpp>
 #include <esokit/control/time_proportioned.hpp>

@@ -206,6 +206,10 @@ requires(detail::goes_into_a_loop<Observer>()) class Adrc {
     return status;
   }
 
+  /// From the next sample on u is held and the observer goes on, or the law determines u again. It
+  /// has no effect in the start hold and in safe mode; Resting decides when.
+  void rest(bool at_rest) noexcept { loop_.rest(at_rest); }
+
   /// New settings while running. A refused config changes nothing. A running start hold keeps its
   /// duration; a new one has no effect.
   Check<S> retune(const Config& config) { return detail::retune(*this, config); }

@@ -120,7 +120,8 @@ Expected<CheckedLoop<S>, Error<S>> check_loop(const LoopSettings<S>& settings, S
 enum class LoopMode : unsigned char {
   running,     ///< the law
   start_hold,  ///< the start hold
-  safe         ///< too many measurements are missing
+  safe,        ///< too many measurements are missing
+  rest         ///< none: the last u is held, see Resting
 };
 
 /// A LoopMode can be written to a stream, see has_text.
@@ -130,7 +131,7 @@ inline constexpr bool has_text<LoopMode> = true;
 /// Writes the name of the mode.
 template <class Stream, std::same_as<LoopMode> Value>
 requires detail::WritesText<Stream> Stream& operator<<(Stream& out, Value mode) {
-  constexpr const char* names[] = {"running", "start_hold", "safe"};
+  constexpr const char* names[] = {"running", "start_hold", "safe", "rest"};
   out << names[static_cast<int>(mode)];
   return out;
 }
@@ -313,6 +314,13 @@ class ControlLoop {
       set_mode(LoopMode::running);
     }
     return status;
+  }
+
+  /// While the law determines u: from now on u is held, and the observer goes on; or the law again.
+  void rest(bool at_rest) noexcept {
+    if (mode_ == (at_rest ? LoopMode::running : LoopMode::rest)) {
+      set_mode(at_rest ? LoopMode::rest : LoopMode::running);
+    }
   }
 
   /// Takes over the settings of `fresh`; state, output and mode are kept. If the observer refuses
@@ -567,6 +575,7 @@ class ControlLoop {
 
   /// The output if the law does not determine it.
   [[nodiscard]] ESOKIT_COLD S other_output() noexcept {
+    if (mode_ == LoopMode::rest) return output();
     if (mode_ == LoopMode::safe) return set_.hold_safe ? output() : set_.safe_input;
     // The step in which the hold ends is still held.
     if (--hold_left_ == 0) set_mode(LoopMode::running);

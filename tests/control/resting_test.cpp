@@ -1,0 +1,298 @@
+// A loop that rests: stiction and an encoder, loads that come slowly, lost samples, limits of u.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <esokit/adapter/variable_time.hpp>
+#include <esokit/adapter/wrapped_output.hpp>
+#include <esokit/control/resting.hpp>
+#include <esokit/core/packed.hpp>
+#include <esokit/core/snapshot.hpp>
+#include <esokit/observer/linear_eso.hpp>
+#include <support/numbers.hpp>
+#include <support/refusal.hpp>
+
+namespace esokit_test {
+namespace control_resting_test {
+
+using namespace esokit;
+
+constexpr double T = 1e-3;
+constexpr double count = 2 * 3.14159265358979 / 4096;
+
+template <class S = double>
+using Axis = Resting<Adrc<LinearEso<2, S>>>;
+
+template <class S = double>
+typename Axis<S>::Config config(double error = 1.5 * count, double time = 0.25) {
+  return {.controller = {.observer = {.observer_bandwidth = S(150),
+                                      .input_gain = S(50),
+                                      .sample_time = S(T)},
+                         .controller_bandwidth = S(20),
+                         .limits = {.lower = S(-12), .upper = S(12)}},
+          .rest = {.error = static_cast<S>(error), .time = static_cast<S>(time)}};
+}
+
+/// An axis with stiction and Coulomb friction, y by an encoder.
+struct Joint {
+  double stick = 60, coulomb = 20, load = 0, x = 0, v = 0;
+  void step(double u) {
+    constexpr int parts = 20;
+    constexpr double h = T / parts;
+    for (int i = 0; i < parts; ++i) {
+      const double f = 50 * u + load;
+      if (!(std::abs(v) > 0) && std::abs(f) <= stick) continue;
+      const double sign = std::copysign(1.0, std::abs(v) > 0 ? v : f);
+      const double next = v + h * (f - coulomb * sign - 3 * v);
+      v = v * next < 0 ? 0 : next;
+      x += h * v;
+    }
+  }
+  [[nodiscard]] double measured() const { return count * std::round(x / count); }
+};
+
+struct Course {
+  double way = 0, largest = 0;
+  int changes = 0, rests = 0;
+};
+template <class C>
+Course run(C& controller, Joint& joint, int samples, double r = 0.9995, double ramp = 0) {
+  using S = typename C::scalar_type;
+  Course course;
+  double last = 0;
+  for (int k = 0; k < samples; ++k) {
+    const double before = joint.x;
+    joint.load += ramp * T;
+    const double u = double(controller.update(static_cast<S>(joint.measured()), static_cast<S>(r)));
+    joint.step(u);
+    course.way += std::abs(joint.x - before);
+    course.changes += std::abs(u - last) > 0 ? 1 : 0;
+    course.rests += controller.mode() == LoopMode::rest ? 1 : 0;
+    course.largest = std::max(course.largest, std::abs(joint.x - r));
+    last = u;
+  }
+  return course;
+}
+
+template <class S>
+void comes_to_rest() {
+  auto hunting = Axis<S>::make(config<S>(0, 0)).value();
+  auto resting = Axis<S>::make(config<S>()).value();
+  Joint a, b;
+  run(hunting, a, 10000);
+  run(resting, b, 10000);
+  const Course hunts = run(hunting, a, 10000), rests = run(resting, b, 10000);
+  EXPECT_GT(hunts.way, 100 * count);
+  EXPECT_EQ(hunts.rests, 0);
+  EXPECT_EQ(rests.way, 0);
+  EXPECT_EQ(rests.changes, 1);  // from the 0 with which the course begins
+  EXPECT_EQ(rests.rests, 10000);
+  EXPECT_LE(rests.largest, 2 * count);
+}
+TEST(Resting, EndsTheLimitCycleOfStiction) {
+  comes_to_rest<double>();
+  comes_to_rest<float>();
+}
+
+/// Without it, it is the controller: to the bit.
+TEST(Resting, IsOffByDefault) {
+  auto with = Axis<>::make({.controller = config().controller}).value();
+  auto plain = Adrc<LinearEso<2>>::make(config().controller).value();
+  Random random(1);
+  for (int k = 0; k < 300; ++k) {
+    const double y = random.index(9) == 0 ? hidden_nan<double>() : 1 + 1e-9 * random.uniform(-1, 1);
+    ASSERT_TRUE(same_bits(with.update(y, 1), plain.update(y, 1)));
+    ASSERT_EQ(with.mode(), plain.mode());
+  }
+}
+
+TEST(Resting, BothSidesOfItsBandAndTime) {
+  auto settings = config(0.25, 10 * T);
+  settings.controller.limits = {};
+  auto c = Axis<>::make(settings).value();
+  const auto step = [&](double y, double r) {
+    const double u = c.update(y, r);
+    return std::pair(c.mode() == LoopMode::rest, u);
+  };
+  // Eleven samples make ten steps: from the eleventh on u is held. The first has another r.
+  for (int k = 0; k < 11; ++k) EXPECT_FALSE(step(0.75, 1).first) << k;
+  const double held = c.output();
+  EXPECT_TRUE(step(0.75, 1).first);
+  EXPECT_EQ(step(1.25, 1).second, held);
+  EXPECT_EQ(step(0.9, 1).second, held);
+  // The edge belongs to it; what is beyond does not.
+  EXPECT_FALSE(step(1.2501, 1).first);
+  EXPECT_NE(c.output(), held);
+  for (int k = 0; k < 10; ++k) EXPECT_FALSE(step(1, 1).first) << k;
+  EXPECT_TRUE(step(1, 1).first);
+  // Another reference, however little, and one that moves.
+  EXPECT_FALSE(step(1, 1 + 1e-12).first);
+  for (int k = 0; k < 11; ++k) step(1, 1 + 1e-12);
+  EXPECT_EQ(c.mode(), LoopMode::rest);
+  c.update(1, {1 + 1e-12, 0.0, 1e-9});
+  EXPECT_EQ(c.mode(), LoopMode::running);
+  for (int k = 0; k < 100; ++k) c.update(1, {1 + 1e-12, 1e-9});
+  EXPECT_EQ(c.mode(), LoopMode::running);
+  // A list that does not move is a constant; start and track end it.
+  for (int k = 0; k < 12; ++k) c.update(1, {1 + 1e-12, 0.0});
+  EXPECT_EQ(c.mode(), LoopMode::rest);
+  EXPECT_EQ(c.track(1, 1 + 1e-12, 3), 3);
+  EXPECT_EQ(c.mode(), LoopMode::running);
+  for (int k = 0; k < 12; ++k) step(1, 1 + 1e-12);
+  EXPECT_EQ(c.mode(), LoopMode::rest);
+  EXPECT_EQ(c.start(1, 0.5), StepStatus::ok);
+  EXPECT_FALSE(step(1, 1 + 1e-12).first);
+}
+
+TEST(Resting, RefusesByName) {
+  const auto refused = [](const Axis<>::Config& c) { return refusal(Axis<>::make(c)); };
+  EXPECT_EQ(refused(config(-1e-9, 0)), "rest.error: must be finite and not negative");
+  EXPECT_EQ(refused(config(hidden_nan<double>(), 0)),
+            "rest.error: must be finite and not negative");
+  EXPECT_EQ(refused(config(1, -1)), "rest.time: must be finite and not negative");
+  EXPECT_EQ(refused(config(0, 1)), "rest.error: must be above 0, or rest.time be left out");
+  EXPECT_EQ(refused(config(1, 65.534)), "accepted");
+  EXPECT_EQ(refused(config(1, 65.536)), "rest.time: must be below 65535 samples");
+  auto divided = config();
+  divided.controller.measurement_divider = 2;
+  EXPECT_EQ(refused(divided), "measurement_divider: must be 1 with rest.error");
+  divided.rest = {};
+  EXPECT_EQ(refused(divided), "accepted");
+}
+
+/// How far an axis gets that was at `speed` when it left the band: by a loop of omega_c = 20 rad/s,
+/// from an estimate that lags 3 / omega_o.
+double beyond(double speed) { return speed * (1 / (std::exp(1) * 20) + 3.0 / 150); }
+
+/// A load that comes as slowly as you like is answered at the edge of the band, at the latest, and
+/// dhat knows it.
+TEST(Resting, MasksNoLoad) {
+  for (const double ramp : {0.3, 3.0, 30.0, -30.0, 300.0}) {
+    for (const bool sticks : {false, true}) {
+      SCOPED_TRACE(std::to_string(ramp) + (sticks ? " with stiction" : ""));
+      auto resting = Axis<>::make(config()).value();
+      auto plain = Axis<>::make(config(0, 0)).value();
+      Joint a, b;
+      if (!sticks) a.stick = a.coulomb = b.stick = b.coulomb = 0;
+      run(resting, a, 10000);
+      run(plain, b, 10000);
+      EXPECT_TRUE(!sticks || resting.mode() == LoopMode::rest);
+      const int samples = std::min(static_cast<int>(300 / std::abs(ramp) / T), 100000);
+      const Course with = run(resting, a, samples, 0.9995, ramp);
+      const Course without = run(plain, b, samples, 0.9995, ramp);
+      // What breaks away is faster by stiction than by friction across the whole band, which is
+      // known to half a count at either end. What does not stick was given at most
+      // omega_c^2 times the band.
+      const double band = 1.5 * count + 0.5 * count;
+      const double most = sticks ? band + beyond(std::sqrt(2 * 40 * 2 * band))
+                                 : band + count + beyond(2 * 20 * (band + count));
+      EXPECT_LT(with.largest, std::max(without.largest + count, most));
+      if (!sticks) {
+        EXPECT_NEAR(resting.observer().total_disturbance(), a.load - 3 * a.v,
+                    0.05 * std::abs(a.load) + 25);
+      }
+    }
+  }
+}
+
+/// Held within the band by nothing, an axis drifts to its edge and is answered there.
+TEST(Resting, DoesNotDriftAway) {
+  for (const double error : {5 * count, 20 * count, 80 * count}) {
+    for (const double time : {0.0, 0.05, 0.25, 0.5}) {
+      auto c = Axis<>::make(config(error, time)).value();
+      Joint joint{.stick = 0, .coulomb = 0, .load = 5};
+      run(c, joint, 5000);
+      const Course course = run(c, joint, 60000);
+      EXPECT_GT(course.rests, 1000);
+      EXPECT_LT(course.largest, error + beyond(2 * 20 * error)) << error << ' ' << time;
+    }
+  }
+}
+
+TEST(Resting, ALostSensorEndsInItsInput) {
+  auto settings = config(0.25, 0);
+  settings.controller.missing = {.most = 5, .input = -1.5};
+  auto c = Axis<>::make(settings).value();
+  c.start(1, 0.5);
+  for (int k = 0; k < 3; ++k) c.update(1, 1);
+  ASSERT_EQ(c.mode(), LoopMode::rest);
+  const double held = c.output();
+  for (int k = 0; k < 5; ++k) {
+    EXPECT_EQ(k % 2 == 0 ? c.update(hidden_nan<double>(), 1) : c.update_without_measurement(1),
+              held);
+    EXPECT_EQ(c.mode(), LoopMode::rest);
+  }
+  EXPECT_EQ(c.update(hidden_nan<double>(), 1), -1.5);
+  EXPECT_EQ(c.mode(), LoopMode::safe);
+  c.update(1, 1);
+  EXPECT_EQ(c.mode(), LoopMode::running);
+  // A reference that is lost is no rest.
+  for (int k = 0; k < 3; ++k) c.update(1, 1);
+  ASSERT_EQ(c.mode(), LoopMode::rest);
+  c.update(1, hidden_nan<double>());
+  EXPECT_EQ(c.mode(), LoopMode::running);
+}
+
+/// What the actuator held instead drives the observer; u, its limits and a retune go on.
+TEST(Resting, KeepsTheOrderOfALoop) {
+  auto c = Axis<>::make(config(0.25, 0)).value();
+  c.start(1, 0.5);
+  for (int k = 0; k < 3; ++k) c.update(1, 1);
+  ASSERT_EQ(c.mode(), LoopMode::rest);
+  const double held = c.output();
+  for (int k = 0; k < 400; ++k) {
+    c.applied(held + 0.25);
+    EXPECT_EQ(c.update(1, 1), held);
+  }
+  EXPECT_NEAR(c.observer().total_disturbance(), -50 * (held + 0.25), 1e-3);
+  auto again = from_snapshot<Axis<>>(snapshot(c)).value();
+  EXPECT_EQ(again.update(1, 1), held);
+  EXPECT_EQ(again.mode(), LoopMode::rest);
+  // A band that is smaller, then limits that u is outside of, then none.
+  ASSERT_TRUE(c.retune(config(0.1, 0)));
+  EXPECT_EQ(c.update(0.95, 1), held);
+  auto narrow = config(0.1, 0);
+  narrow.controller.limits = {.lower = -0.125, .upper = 0.125};
+  ASSERT_TRUE(c.retune(narrow));
+  EXPECT_EQ(c.update(1, 1), 0.125);
+  EXPECT_EQ(c.mode(), LoopMode::rest);
+  const double before = c.output();
+  EXPECT_FALSE(c.retune(config(-1, 0)));
+  EXPECT_EQ(c.update(1, 1), before);
+  ASSERT_TRUE(c.retune(config(0, 0)));
+  c.update(1, 1);
+  EXPECT_EQ(c.mode(), LoopMode::running);
+}
+
+/// An angle by the shorter way; any time between samples; lanes.
+TEST(Resting, AroundAdaptersAndInLanes) {
+  using Turning = Resting<Adrc<WrappedOutput<VariableTime<LinearEso<2>>>>>;
+  auto c = Turning::make(
+               {.controller = {.observer = {.observer = {.observer = config().controller.observer},
+                                            .period = 6},
+                               .controller_bandwidth = 20},
+                .rest = {.error = 0.1, .time = 0}})
+               .value();
+  c.start(2.95, 0.5);
+  for (int k = 0; k < 3; ++k) {
+    ASSERT_TRUE(c.elapsed(k == 1 ? 20 * T : T));
+    c.update(2.95, -2.98);
+  }
+  EXPECT_EQ(c.mode(), LoopMode::rest);
+  ASSERT_TRUE(c.elapsed(T));
+  c.update(2.85, -2.98);
+  EXPECT_EQ(c.mode(), LoopMode::running);
+
+  static_assert(Controller<Axis<>, double>);
+  auto packed = Packed<Axis<>, 2>(Axis<>::make(config(0.25, 0)).value());
+  for (int k = 0; k < 4; ++k) {
+    Pack<double, 2> y;
+    y[0] = 1;
+    y[1] = k;
+    packed.update(y, Pack<double, 2>(1.0));
+  }
+  EXPECT_EQ(packed[0].mode(), LoopMode::rest);
+  EXPECT_EQ(packed[1].mode(), LoopMode::running);
+}
+
+}  // namespace control_resting_test
+}  // namespace esokit_test
