@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <esokit/identify/identify.hpp>
 #include <esokit/identify/seen_curve.hpp>
 #include <esokit/sim/gaussian.hpp>
@@ -23,13 +24,15 @@ constexpr double T = 0.01, pole = 3;
 struct Machine {
   std::function<double(double)> effect = [](double u) { return u; };
   double gain = 20, size = 1, friction = 0;
+  double noise = 0.02;
+  std::uint64_t seed = 11;
   std::size_t rows = 1500;
   bool two_levels = false;
 };
 
 // y' = b0 effect(u(t - 1.5 T)) - a y - friction, steps of u between -size and size.
 Log recorded(const Machine& machine) {
-  esokit::sim::Gaussian gaussian(11);
+  esokit::sim::Gaussian gaussian(machine.seed);
   Log log;
   log.sample_time = T;
   double y = 0, u = 0, before = 0, earlier = 0;
@@ -37,7 +40,7 @@ Log recorded(const Machine& machine) {
     if (k % 40 == 0) u = machine.size * std::erf(gaussian.next());
     if (machine.two_levels) u = std::copysign(machine.size, u);
     log.u.push_back(u);
-    log.y.push_back(y + 0.02 * gaussian.next());
+    log.y.push_back(y + machine.noise * gaussian.next());
     for (int i = 0; i < 20; ++i) {
       const double force = machine.gain * machine.effect(i < 10 ? earlier : before);
       y += T / 20 * (force - pole * y - machine.friction * std::tanh(y / 0.1));
@@ -101,6 +104,23 @@ TEST(SeenCurve, IsToldWithItsSizeAndB0OfTheEffect) {
         EXPECT_NEAR(again->input_gain.value * unit / gain, 1, 0.02) << one.name;
       }
     }
+  }
+}
+
+// Under noise the interval of a size is as wide as the sizes of other records scatter.
+TEST(SeenCurve, IntervalOfTheSizeCoversTheNoise) {
+  for (const Told& one : {told[0], told[2]}) {
+    int seen = 0, covered = 0;
+    for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+      const SeenCurve found =
+          studied(recorded({.effect = one.effect, .noise = 0.4, .seed = seed})).curve;
+      if (found.kind != one.kind) continue;
+      ++seen;
+      covered += std::abs(found.size.value - one.size) <= found.size.half_width ? 1 : 0;
+      EXPECT_LT(found.size.share(), 0.3) << one.name;
+    }
+    ASSERT_GE(seen, 8) << one.name;
+    EXPECT_GE(covered, seen - 1) << one.name;
   }
 }
 
