@@ -133,7 +133,7 @@ TEST(CRunning, OfLongGaps) {
     return [=](auto& settings) {
       auto& chain = innermost(settings);
       chain.observer_bandwidth = decltype(chain.sample_time)(bandwidth);
-      chain.max_gap = 20;
+      chain.max_gap = 16;
     };
   };
   equals_changed<Adrc<LinearEso<2, double>>>(30000, 1401, gcc, fast(500));

@@ -22,8 +22,8 @@ enum class StepStatus : std::uint16_t {
   prediction_dropped = 4,
   /// Samples were missing before this correction, which used the gain for the whole gap.
   gap_bridged = 8,
-  /// More samples than `longest_gap()` were missing, or more than `max_gap()` while corrections
-  /// were due after another long gap (`recovering()`), or the state could not be predicted: the
+  /// More samples than `longest_gap()` were missing, or more than `max_gap()` too soon after other
+  /// long gaps (`recovering()`), or the state could not be predicted: the
   /// observer was restarted as by reset(y). A controller then sets it to rest at y under the
   /// present u, so that u does not jump.
   restarted = 16,

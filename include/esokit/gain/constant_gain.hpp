@@ -78,8 +78,8 @@ class ConstantGain {
 
   /// What a correction after `samples` means for the next gap beyond `longest_gap`, see
   /// GainLawTraits.
-  [[nodiscard]] constexpr int recovery(unsigned samples) const noexcept {
-    return proven().due_after(samples);
+  [[nodiscard]] constexpr int recovery(unsigned samples, int lane = 0) const noexcept {
+    return proven(lane).due_after(samples);
   }
 
  private:
@@ -89,11 +89,12 @@ class ConstantGain {
   ConstantGain() = default;
 
   /// By a bandwidth it takes some products to find; of a list of poles it is kept.
-  [[nodiscard]] constexpr auto proven() const noexcept {
+  [[nodiscard]] constexpr auto proven(int lane = 0) const noexcept {
+    const auto& poles = detail::of_lane(poles_, lane);
     if constexpr (ListsPoles<Placement>) {
-      return proven_;
-    } else if constexpr (requires { Placement::template recovery<Size, S>(poles_); }) {
-      return Placement::template recovery<Size, S>(poles_);
+      return detail::of_lane(proven_, lane);
+    } else if constexpr (requires { Placement::template recovery<Size, LaneScalar<S>>(poles); }) {
+      return Placement::template recovery<Size, LaneScalar<S>>(poles);
     } else {
       return Recovery{};
     }

@@ -54,10 +54,10 @@ struct GainLawTraits {
   /// diverges in recurring gaps. A law that follows time in `advance()` does not need these hooks.
   bool bridges_gaps = false;
 
-  /// `recovery(samples) const`: what a correction with `gap_gain` after `samples` means for the
-  /// next gap beyond `longest_gap`. -1: nothing, and it counts; else the ordinary corrections that
-  /// have to come before it, or 2000000000 if such a gap restarts the observer, as all do without
-  /// it.
+  /// `recovery(samples, lane) const`: what a correction with `gap_gain` after `samples` means for
+  /// the next gap beyond `longest_gap`. -1: nothing, and it counts; else the ordinary corrections
+  /// that have to make up for it, or 2000000000 if such a gap restarts the observer, as all do
+  /// without it. `lane` is that of a pack, else 0.
   bool recovers = false;
 
   /// `gain(e)` may be called with an e that is not finite (the result is then not used); this saves
@@ -91,7 +91,7 @@ concept GainOf = std::convertible_to<Gain, ScaledGain<Size, S>>;
        { fixed.gap_gain(e, 1u) } noexcept -> GainOf<Size, S>;                                     \
        { fixed.longest_gap(1) } noexcept -> std::same_as<int>;)                                   \
   MISTAKEN(bridge_gap) MISTAKEN(gain_for_gap)                                                     \
-  HOOK(Recovers, recovers, recovery, { fixed.recovery(1u) } noexcept -> std::same_as<int>;)       \
+  HOOK(Recovers, recovers, recovery, { fixed.recovery(1u, 0) } noexcept -> std::same_as<int>;)    \
   HOOK(Preset, kind == GainKind::preset, gain_before_measurement,                                 \
        { fixed.gain_before_measurement() } noexcept -> GainOf<Size, S>;)                          \
   MISTAKEN(preset_gain)                                                                           \
@@ -152,12 +152,12 @@ constexpr int bridged_gap(const Laws& laws, int asked) noexcept {
 
 /// What a correction after `samples` means for the next long gap, see GainLawTraits::recovers.
 template <class Laws>
-constexpr int recovery_after(const Laws& laws, unsigned samples) noexcept {
+constexpr int recovery_after(const Laws& laws, unsigned samples, int lane = 0) noexcept {
   int most = GapRecovery<double>::never;
   if constexpr (gain_law_traits<typename Laws::value_type>.recovers) {
     most = -1;
     for (const auto& law : laws) {
-      const int due = law.recovery(samples);
+      const int due = law.recovery(samples, lane);
       most = due > most ? due : most;
     }
   }

@@ -393,12 +393,16 @@ class ModelGain {
 
   /// What a correction after `samples` means for the next gap beyond `longest_gap`, see
   /// GainLawTraits.
-  [[nodiscard]] constexpr int recovery(unsigned samples) const noexcept {
+  [[nodiscard]] constexpr int recovery(unsigned samples, int lane = 0) const noexcept {
     constexpr int never = detail::GapRecovery<double>::never;
-    if (samples <= static_cast<unsigned>(counted_)) return -1;
-    if (samples <= static_cast<unsigned>(longest_step_)) return 0;
+    const auto most = [&](const auto& steps) {
+      return static_cast<unsigned>(detail::of_lane(steps, lane));
+    };
+    if (samples <= most(counted_)) return -1;
+    if (samples <= most(longest_step_)) return 0;
     if (samples > static_cast<unsigned>(MostBridged)) return never;
-    const int due = due_[static_cast<std::size_t>(detail::gain_of_step(samples))];
+    const auto& dues = detail::of_lane(due_, lane);
+    const int due = dues[static_cast<std::size_t>(detail::gain_of_step(samples))];
     return due < 65535 ? due : never;
   }
 

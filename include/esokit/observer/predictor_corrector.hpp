@@ -247,7 +247,7 @@ requires(detail::is_a_gain_law<Law, Order + Extension, S>() &&
     }
     next.numbers_.kept = numbers_.kept;
     // What is due was counted with other gains: it begins anew.
-    if (recovering_ > 0) next.recovering_ = next.most_due();
+    if (recovering_ > 0) next.recovering_ = static_cast<std::uint16_t>(next.most_due());
     next.gap_ = this->missed() == 0 ? next.up_to_date() : gap_;
     LevelStates states = numbers_.kept.states;
     const Model& model = fresh.model();
@@ -370,12 +370,6 @@ requires(detail::is_a_gain_law<Law, Order + Extension, S>() &&
     recovering_ = due < 0        ? std::uint16_t{0}
                   : due < beyond ? static_cast<std::uint16_t>(due)
                                  : beyond;
-  }
-  /// What is due after the longest gap that is bridged.
-  [[nodiscard]] std::uint16_t most_due() const noexcept {
-    const auto samples = static_cast<unsigned>(this->longest_gap()) + 1u;
-    const int due = detail::recovery_after(numbers_.laws, samples);
-    return due > 0 && due < 65535 ? static_cast<std::uint16_t>(due) : std::uint16_t{0};
   }
   /// After a gap that is not bridged, or if y cannot correct the state.
   ESOKIT_COLD StepStatus restart_from(S y, bool overdue) noexcept {

@@ -139,9 +139,11 @@ class ObservedLevels {
     Lanes<bool, S> each{};
     const Lanes<int, S> gaps = missed();
     for (int i = 0; i < lane_count<S>; ++i) {
-      const int most = detail::of_lane(recovering_, i) > 0 ? detail::of_lane(max_gap_, i)
-                                                           : detail::of_lane(longest_gap_, i);
-      detail::of_lane(each, i) = detail::of_lane(gaps, i) > most + 1;
+      const int steps = detail::of_lane(gaps, i);
+      if (steps > detail::of_lane(max_gap_, i) + 1) [[unlikely]] {
+        detail::of_lane(each, i) =
+            steps > detail::of_lane(longest_gap_, i) + 1 || owes_too_much(steps, i);
+      }
     }
     return each;
   }
@@ -162,17 +164,17 @@ class ObservedLevels {
   /// VariableTime and what is written in integers. A constant gain may go on, see `longest_gap`.
   [[nodiscard]] constexpr int max_gap() const noexcept { return max_gap_; }
 
-  /// Missing samples that a correction bridges if no other is due, see `recovering`; after more it
-  /// restarts. The config's number for a constant gain (LinearEso, HalfGainEso, ReducedOrderEso,
+  /// Missing samples that a correction bridges if no others are due, see `recovering`; after more
+  /// it restarts. The config's number for a constant gain (LinearEso, HalfGainEso, ReducedOrderEso,
   /// ModelEso, cascades): for the chain with any list of poles, or up to 7 states by a bandwidth;
   /// for a model at most 400. Of other gains, in Guarded, and while a model follows a
   /// speed, it is `max_gap()`.
   [[nodiscard]] constexpr int longest_gap() const noexcept { return longest_gap_; }
 
-  /// Corrections that have to come before the next gap beyond `max_gap()` is bridged; while any are
-  /// due it restarts the observer, so that errors decay in any sequence of gaps. A correction
-  /// without a gap, or after a few samples, takes one away, one after a long gap adds some:
-  /// after 50 / omega_o about 6 / (omega_o T) for three states, 13 for four.
+  /// Corrections that are due after gaps beyond `max_gap()`. One without a gap, or after a few
+  /// samples, takes one away, one after a long gap adds some: after 50 / omega_o about 6 / (omega_o
+  /// T) for three states, 13 for four. The next long gap restarts the observer if more than twice
+  /// what `longest_gap()` alone makes due would be. So errors decay in any sequence of gaps.
   [[nodiscard]] constexpr Lanes<int, S> recovering() const noexcept { return recovering_; }
 
   /// What is known of the plant.
@@ -259,6 +261,22 @@ class ObservedLevels {
   }
 
   static constexpr bool recovers = gain_law_traits<Law>.recovers;
+
+  /// What is due after the longest gap that is bridged.
+  [[nodiscard]] constexpr int most_due(int lane = 0) const noexcept {
+    const auto samples = static_cast<unsigned>(detail::of_lane(longest_gap_, lane)) + 1u;
+    const int due = detail::recovery_after(numbers_.laws, samples, lane);
+    return due > 0 && due < 65535 ? due : 0;
+  }
+  /// Whether a correction after `samples`, more than any correction bridges, has to wait for those
+  /// that are due. With V and q of GapRecovery, V q^due falls over every correction however many
+  /// are due; that these are bounded bounds V. For two of the longest gaps there has to be room.
+  [[nodiscard]] constexpr bool owes_too_much(int samples, int lane) const noexcept {
+    const int due = detail::of_lane(recovering_, lane);
+    if (due == 0) return false;
+    const int more = detail::recovery_after(numbers_.laws, static_cast<unsigned>(samples), lane);
+    return more > 2 * most_due(lane) - due;
+  }
 
   Numbers numbers_;
   Lanes<std::uint16_t, S> gap_{};

@@ -19,6 +19,25 @@ static void up_to_date(esokit_state *o)
 #endif
 }
 
+#if ESOKIT_RECOVERS
+#if !ESOKIT_SETTINGS
+static const uint16_t recovery[ROWS] = { /* 0: counts; else 1 more than are due after it */
+  DESIGN_RECOVERY
+};
+#endif
+
+/* What is due after the longest gap that is bridged. */
+static uint32_t most_due(const esokit_state *o)
+{
+  uint32_t most = recovery_of[LAST_ROW];
+  (void)o;
+  if (most > 0u) {
+    most = most - 1u;
+  }
+  return most;
+}
+
+#endif
 /* The next y restarts. */
 static bool is_overdue(const esokit_state *o)
 {
@@ -26,21 +45,18 @@ static bool is_overdue(const esokit_state *o)
     return true;
   }
 #if ESOKIT_RECOVERS
-  return (o->due != 0u) && (o->gap > BRIDGED);
-#else
-  return false;
+  if ((o->due != 0u) && (o->gap > BRIDGED)) { /* no more than after two of the longest */
+    const uint32_t more = recovery_of[o->gap - 1u];
+    return ((uint32_t)o->due + more) > (most_due(o) + most_due(o) + 1u);
+  }
 #endif
+  return false;
 }
 
 #if ESOKIT_RECOVERS
 /* What a correction means for the next gap of more than BRIDGED samples. */
 static void recover(esokit_state *o, unsigned elapsed)
 {
-#if !ESOKIT_SETTINGS
-  static const uint16_t recovery[ROWS] = { /* 0: counts; else 1 more than are due after it */
-    DESIGN_RECOVERY
-  };
-#endif
   const uint32_t more = recovery_of[elapsed - 1u];
   const uint32_t due = (uint32_t)o->due + more;
   if ((o->due < 65535u) && (due > 0u)) { /* else it is more than can be counted: until a restart */
@@ -57,12 +73,8 @@ static void recover(esokit_state *o, unsigned elapsed)
 static void recover_anew(esokit_state *o)
 {
 #if ESOKIT_RECOVERS
-  const uint16_t most = recovery_of[LAST_ROW];
   if (o->due != 0u) {
-    o->due = 0u;
-    if (most > 0u) {
-      o->due = (uint16_t)(most - 1u);
-    }
+    o->due = (uint16_t)most_due(o);
   }
 #else
   (void)o;
