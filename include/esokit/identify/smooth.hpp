@@ -107,8 +107,8 @@ Expected<SmoothedLog, Error<double>> smooth(const Log& log, const SmoothModel& m
 }  // namespace detail
 
 /// The states and the disturbance of a log, each from all rows before and after it, with their
-/// standard deviations: the smoother of Rauch, Tung and Striebel, in the square-root form of
-/// Bierman, which takes nothing as known of the start. For what is wanted of yesterday's log (the
+/// standard deviations. It is the smoother of Rauch, Tung and Striebel in the square-root form of
+/// Bierman, and takes nothing as known of the start. For what is wanted of yesterday's log (the
 /// friction over the speed, cogging over the angle, the force of a contact): an observer lags, this
 /// does not.
 ///
