@@ -71,10 +71,10 @@ constexpr double reach_by_size(double factor, int size) noexcept { return factor
 /// What longer steps cost, in corrections. With V(e) = e' P^-1 e, P = sum_i (A k)(A k)' / q^i, each
 /// ordinary correction takes V to q V at most, and so does one after up to `counted` samples. One
 /// after M samples may multiply V by 1 / q^D: then D of the others have to follow before V is below
-/// what it was. V q^due, with all that is due, falls over each longer step and never rises. So
-/// errors decay in each sequence of steps in which longer ones than a BridgedSteps allows are only
-/// taken while no more than some number is due: V falls with it at these times, and if there is
-/// none any more, what remains is a sequence of bridged steps.
+/// what it was. V q^due, with all that is due, falls over each longer step and never rises. Longer
+/// ones than a BridgedSteps allows are taken only while no more than some number is due: at these
+/// times V falls with it. If there are none any more, a sequence of bridged steps remains. So
+/// errors decay in each sequence of such steps.
 ///
 /// For a chain, V grows at most like M^(2 (N - 2)), so that D rises with the logarithm of M.
 template <PlainScalar S>
