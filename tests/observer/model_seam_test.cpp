@@ -452,37 +452,39 @@ TEST(ModelGain, RandomGapsThatAreBridgedLetErrorsDecay) {
   }
 }
 
-TEST(ModelGain, ALongerGapIsBridgedIfNoCorrectionIsDue) {
+TEST(ModelGain, LongGapsAreBridgedUntilTwiceTheMostIsDue) {
   auto observer =
       ResonatorEso<2>::make(
           {.observer_bandwidth = 200.0, .input_gain = 1.0, .sample_time = kT, .model = {kW}})
           .value();
   const int most = observer.max_gap();
   EXPECT_LT(most, 100);
-  const auto status_after = [&](int missing) {
-    auto copy = observer;
-    for (int k = 0; k < missing; ++k) (void)copy.predict(0.0);
-    return copy.update(1.0, 0.0);
+  const auto update_after = [](auto& of, int missing) {
+    for (int k = 0; k < missing; ++k) (void)of.predict(0.0);
+    return of.update(1.0, 0.0);
   };
-  EXPECT_EQ(status_after(1), StepStatus::gap_bridged);
-  EXPECT_EQ(status_after(most), StepStatus::gap_bridged);
+  const auto due_after = [&](int missing) {
+    auto copy = observer;
+    EXPECT_EQ(update_after(copy, missing), StepStatus::gap_bridged) << missing;
+    return copy.recovering();
+  };
   const int longest = observer.longest_gap();
   EXPECT_EQ(longest, 100);
-  for (const int first : {most + 1, longest}) {  // one is harmless, a second one is not yet
-    EXPECT_EQ(status_after(first), StepStatus::gap_bridged);
-    auto after = observer;
-    for (int k = 0; k < first; ++k) (void)after.predict(0.0);
-    (void)after.update(1.0, 0.0);
-    const int due = after.recovering();
-    EXPECT_GT(due, 0);
-    for (const bool waits : {false, true}) {
-      auto copy = after;
-      for (int k = 0; k < (waits ? due : due - 1); ++k) (void)copy.update(1.0, 0.0);
-      for (int k = 0; k < most + 1; ++k) (void)copy.predict(0.0);
-      EXPECT_EQ(copy.update(1.0, 0.0), waits ? StepStatus::gap_bridged : StepStatus::restarted);
-    }
+  EXPECT_EQ(due_after(most), 0);
+  EXPECT_GT(due_after(most + 1), 0);
+  const int least = due_after(longest);
+  EXPECT_GT(least, 1);
+  auto twice = observer;
+  for (int gap = 0; gap < 2; ++gap) {
+    EXPECT_EQ(update_after(twice, longest), StepStatus::gap_bridged) << gap;
   }
-  EXPECT_EQ(status_after(longest + 1), StepStatus::restarted);
+  EXPECT_EQ(twice.recovering(), 2 * least);
+  for (const bool waits : {false, true}) {
+    auto copy = twice;
+    for (int k = 0; k < (waits ? least : least - 1); ++k) (void)copy.update(1.0, 0.0);
+    EXPECT_EQ(update_after(copy, longest), waits ? StepStatus::gap_bridged : StepStatus::restarted);
+  }
+  EXPECT_EQ(update_after(observer, longest + 1), StepStatus::restarted);
 }
 
 TEST(ModelGain, AGapShorterThanTheModelAllowsIsKept) {

@@ -111,8 +111,18 @@ TYPED_TEST(RandomConfig, ModerateDataWithBadSamples) {
       const bool bad_u = kind == 0 || kind == 1;
       const bool bad_y = kind == 1 || kind == 2;
       ++missed;
-      // A second long gap while corrections are due, and one that is too long, restart.
-      const int longest = observer.recovering() > 0 ? observer.max_gap() : observer.longest_gap();
+      // A long gap restarts if it is too long, or if more than twice the most would then be due.
+      const auto due_after = [&](int steps) {
+        TypeParam fresh = *outcome;
+        for (int step = 1; step < steps; ++step) (void)fresh.predict(S(0));
+        (void)fresh.update(S(0), S(0));
+        return fresh.recovering();
+      };
+      bool restarts = missed > observer.longest_gap() + 1;
+      if (missed > observer.max_gap() + 1 && observer.recovering() > 0) {
+        restarts = restarts || observer.recovering() + due_after(missed) >
+                                   2 * due_after(observer.longest_gap() + 1);
+      }
       StepStatus expected = bad_u ? StepStatus::input_rejected : StepStatus::ok;
       StepStatus status;
       if (kind == 3) {
@@ -122,7 +132,7 @@ TYPED_TEST(RandomConfig, ModerateDataWithBadSamples) {
         if (bad_y) {
           expected |= StepStatus::measurement_rejected;
         } else {
-          if (missed > longest + 1) {
+          if (restarts) {
             expected |= StepStatus::restarted;
           } else if (missed > 1) {
             expected |= StepStatus::gap_bridged;

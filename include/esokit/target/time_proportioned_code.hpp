@@ -57,6 +57,7 @@ Expected<CCode, Error<S>> to_c(const TimeProportioned<S>& output, const CodeOpti
   text.constant("WINDOW", std::to_string(numbers.window));
   text.constant("SHORTEST", std::to_string(numbers.shortest));
   text.constant("LONGEST", std::to_string(numbers.longest));
+  text.constant("LAST_SAMPLE", std::to_string(numbers.window - 1));
   text.constant("BEYOND_LONGEST", std::to_string(numbers.longest + numbers.window));
   text.constant("OFF_VALUE", number(numbers.off));
   text.constant("ON_VALUE", number(numbers.on));

@@ -72,7 +72,7 @@ bool esokit_update(esokit_state *o, real u)
     plan(o, u);
   }
   is_on = o->sample < o->on_samples;
-  if (o->sample < (WINDOW - 1)) {
+  if (o->sample < LAST_SAMPLE) {
     o->sample = o->sample + 1;
   } else {
     o->sample = 0;
