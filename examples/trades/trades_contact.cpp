@@ -194,7 +194,9 @@ int main(int argc, char** argv) {
                              rates[j], alarms[j],
                              Tolerance::absolute(4 * std::sqrt(rates[j] / hours)), "computed");
     }
-    const auto at = [&](double share) { return delays[static_cast<std::size_t>(1000 * share)]; };
+    const auto at = [&times = delays](double share) {
+      return times[static_cast<std::size_t>(1000 * share)];
+    };
     report.expect(name, "delay computed (ms)", 1e3 * said.delay, true, "reported");
     report.expect(name, "delay, median (ms)", 1e3 * at(0.5), at(0.5) <= said.delay + 1e-9,
                   "at most as computed");
