@@ -170,8 +170,8 @@ int main(int argc, char** argv) {
   Figure figure("noise", {.rows = 1, .columns = 3, .panel_height = 230});
   figure.caption(
       "Noise in u at equal disturbance bandwidth (50 rad/s), omega_c = 5 rad/s. Left: over the "
-      "number of levels, for T = 1 ms; crosses: simulations of 1e7 samples of observer and control "
-      "law. Middle: over frequency, n = 2. Right: over the sample time, n = 2, for the same noise "
+      "number of levels, for T = 1 ms; crosses: simulations of 1e7 samples. "
+      "Middle: over frequency, n = 2. Right: over the sample time, n = 2, for the same noise "
       "per sample: it falls with the square root of T, because a smaller part of the noise is "
       "within the band of the observer. The second level reduces the noise most, and more so for "
       "plants of higher order.");

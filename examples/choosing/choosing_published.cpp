@@ -534,8 +534,8 @@ int main(int argc, char** argv) {
       lines);
   sweep(report);
   report.remark(
-      "All models come from the half rule: one lag is the pole of the plant, one that of the "
-      "actuator. AMIGO gets what it is made for, the tangent and the 63 % of the step response. "
+      "All models come from the half rule: a lag of the plant and one of the actuator. "
+      "AMIGO gets what it is made for, the tangent and the 63 % of the step response. "
       "SIMC has tau_c = theta; it and AMIGO filter the derivative with a tenth of T_d. The best "
       "PIDs have a filter of second order on y, damping 0.707, Ms <= 1.6 and at most the noise of "
       "AMIGO; so has tune, whose disturbance is so large that J is nearly the ISE of a load "

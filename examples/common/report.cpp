@@ -140,20 +140,16 @@ PrintedColumn::PrintedColumn(const std::vector<SingleRun>& numbers, int fitted) 
 
 std::string PrintedColumn::rule(std::size_t seeds) {
   const auto text = [](double number) { return number_text(number, 3); };
-  return "Printed numbers that are of single runs with noise, beside the mean and standard "
-         "deviation (sd) of ours over " +
-         std::to_string(seeds) + " seeds. A number is not judged where 3 sd are more than " +
-         text(100.0 * widest) +
-         " % of it; there it can only be missed, beyond 3 sd. The others of a column are judged "
-         "together by chi-square, the sum of z^2, where z is the difference in sd of a single run. "
-         "The column reproduces if p, the probability of a larger sum for independent numbers, "
-         "is " +
-         text(100.0 * least_probability) + " % or more. It does not if the rms of z is above " +
+  return "Printed numbers of single runs with noise, beside mean and standard deviation (sd) of "
+         "ours over " +
+         std::to_string(seeds) + " seeds. Where 3 sd are more than " + text(100.0 * widest) +
+         " % of a number, it can only be missed, beyond 3 sd. The others of a column are judged "
+         "together, by p, the probability of a larger sum of z^2; z is the difference in sd. The "
+         "column reproduces if p is " +
+         text(100.0 * least_probability) + " % or more, and does not if the rms of z is above " +
          text(largest_rms) +
-         ". Runs of a paper may have the same noise; then the sum scatters more than p tells, but "
-         "at most as if all z were one number. Between the two it is doubtful. A single "
-         "number is met within " +
-         text(within) + " sd, but only in a column that reproduces; outside it is missed.";
+         "; between the two it is doubtful. A number of a column that reproduces is met within " +
+         text(within) + " sd, else missed.";
 }
 
 std::string PrintedColumn::verdict_text() const {
