@@ -154,7 +154,7 @@ start() {
 units=(
   "core/pack core/scalar core/lanes core/expected core/check core/matrix core/snapshot math/combinatorics math/fal math/fine_sum math/positivity analysis/integrator_chain"
   "gain/continuous_gain gain/covariance_factor gain/feedback_gain gain/gain_interval gain/riccati gain/sampled_gain observer/named_observer observer/predictor_corrector observer/cascade_identities adapter/outlier_gate adapter/actuator_map"
-  "observer/pack"
+  "observer/pack observer/update_on_paper"
   "control/adrc_law control/approach_profile control/at_limits control/nonlinear_feedback tune/pid_conversion control/retune control/tracking_differentiator control/smooth_profile control/time_proportioned"
   "control/experiment"
   "sim/plant sim/noise sim/counted_gaussian sim/signals sim/metrics analysis/dense identify/input_checks"
