@@ -304,6 +304,20 @@ double tracking_error(const Faults& faults, std::uint64_t seed) {
   return 1e3 * std::sqrt(sum / time);
 }
 
+/// Two runs in two panels, the first thin in red; the legend is in the upper one.
+template <class Run>
+void draw_pair(Panel& upper, Panel& lower, std::vector<double> Run::*above,
+               std::vector<double> Run::*below, const char* name, const Run& run,
+               const char* other_name, const Run& other) {
+  const auto draw = [&](const Run& one, Style style) {
+    upper.line(one.t, one.*above, style);
+    style.name.clear();
+    lower.line(one.t, one.*below, style);
+  };
+  draw(run, {.name = name, .color = Color::vermillion, .width = 1.3});
+  draw(other, {.name = other_name, .color = Color::blue, .width = 2.4});
+}
+
 // ---- a pause of the loop
 
 struct Paused {
@@ -343,7 +357,7 @@ Paused paused(bool says) {
 
 void pause(Report& report) {
   const Paused lost = paused(false), said = paused(true);
-  report.expect("a pause of 20 samples, said", "largest abs(dhat - d) after it", said.largest,
+  report.expect("a pause of 20 samples, elapsed", "largest abs(dhat - d) after it", said.largest,
                 said.largest < 1e-3, "below 1e-3");
   report.expect("a pause of 20 samples, left out", "largest abs(dhat - d) after it", lost.largest,
                 lost.largest > 30, "above 30");
@@ -356,13 +370,8 @@ void pause(Report& report) {
   auto& errors = figure.panel(1, 0).x_label("t (s)").y_label("r - y (1e-3)").x_range(0.5, 0.75);
   disturbances.name("estimate");
   errors.name("error");
-  const auto draw = [&](const Paused& run, Style style) {
-    disturbances.line(run.t, run.disturbance, style);
-    style.name.clear();
-    errors.line(run.t, run.error, style);
-  };
-  draw(lost, {.name = "pause left out", .color = Color::vermillion, .width = 1.3});
-  draw(said, {.name = "elapsed", .color = Color::blue, .width = 2.4});
+  draw_pair(disturbances, errors, &Paused::disturbance, &Paused::error, "pause left out", lost,
+            "elapsed", said);
   report.add(figure);
 }
 
@@ -421,13 +430,7 @@ void rests(Report& report) {
   auto& inputs = figure.panel(1, 0).x_label("t (s)").y_label("u (V)").x_range(10, 20);
   errors.name("error");
   inputs.name("input");
-  const auto draw = [&](const Hunt& run, Style style) {
-    errors.line(run.t, run.error, style);
-    style.name.clear();
-    inputs.line(run.t, run.input, style);
-  };
-  draw(plain, {.name = "Adrc", .color = Color::vermillion, .width = 1.3});
-  draw(resting, {.name = "rest", .color = Color::blue, .width = 2.4});
+  draw_pair(errors, inputs, &Hunt::error, &Hunt::input, "Adrc", plain, "rest", resting);
   report.add(figure);
 }
 

@@ -252,8 +252,9 @@ int main(int argc, char** argv) {
 
   Figure figure("contact", {.rows = 1, .columns = 2, .panel_height = 220});
   figure.caption(
-      "Left: a joint meets a spring of 5 N m/rad at 0.5 rad/s; its torque, the estimate and the "
-      "threshold for one false alarm an hour. Right: false alarms counted in four hours, against "
+      "Left: a joint meets a spring of 5 N m/rad at 0.5 rad/s; its torque, the estimate and, "
+      "dotted, the threshold for one false alarm an hour. Right: false alarms counted in four "
+      "hours, against "
       "what was asked for; crosses: b0 negative.");
   figure.panel(0, 0)
       .x_label("t after contact (ms)")
