@@ -57,7 +57,7 @@ Found of_rows(const std::vector<double>& apart, const Unit& unit, double begin,
     const bool spread = from_log::spread_stamps(stamps).spread;  // sounds an alarm, too
     if (!(from_log::usual_step(stamps) > 0)) continue;
     const auto verdict = from_log::judge_clock(read(stamps));
-    if (!verdict.told())
+    if (!verdict.decided())
       ++found.asked;
     else if (std::abs(verdict.unit / unit.seconds - 1) < 1e-9)
       ++found.right;
@@ -122,7 +122,7 @@ TEST(Clock, AUnitIsRightOrAskedFor) {
   EXPECT_GE(all.right, 2300);
   for (const double first : {0.0, 1.0}) {
     const auto verdict = from_log::judge_clock(read(written(first, 1, 1, 1000, 0)));
-    EXPECT_FALSE(verdict.told()) << "rows that are counted are no time";
+    EXPECT_FALSE(verdict.decided()) << "rows that are counted are no time";
   }
 }
 
@@ -168,7 +168,7 @@ TEST(Clock, WholeNumbersFromZeroByTheNameOfY) {
     ClockRead clock = read(written(0, 1, step, 2000, 0));
     clock.pace = pace;
     const auto verdict = from_log::judge_clock(clock);
-    EXPECT_EQ(verdict.doubtful, verdict.told());
+    EXPECT_EQ(verdict.doubtful, verdict.decided());
     return verdict.unit;
   };
   for (const double step : {1, 2, 10, 20, 60, 100, 1000}) EXPECT_EQ(unit(step, Pace::unknown), 0);
@@ -184,29 +184,29 @@ TEST(Clock, FractionsThatAreRoundInAnotherUnit) {
   const auto clock = [](double begin, double unit, double T, int decimals) {
     return from_log::judge_clock(read(written(begin, unit, T, 2000, decimals)));
   };
-  EXPECT_FALSE(clock(0, 60, 1, 8).told());
-  EXPECT_FALSE(clock(0, 60, 1, 4).told());
-  EXPECT_FALSE(clock(0, 60, 1, 2).told());        // too few digits for that, but the mean step
-  EXPECT_FALSE(clock(17.3, 60, 0.75, 8).told());  // 0.288333 and steps of 0.0125
-  EXPECT_FALSE(clock(0, 86400, 45, 9).told());
-  EXPECT_FALSE(clock(0, 3600, 2700.5, 9).told());
+  EXPECT_FALSE(clock(0, 60, 1, 8).decided());
+  EXPECT_FALSE(clock(0, 60, 1, 4).decided());
+  EXPECT_FALSE(clock(0, 60, 1, 2).decided());        // too few digits for that, but the mean step
+  EXPECT_FALSE(clock(17.3, 60, 0.75, 8).decided());  // 0.288333 and steps of 0.0125
+  EXPECT_FALSE(clock(0, 86400, 45, 9).decided());
+  EXPECT_FALSE(clock(0, 3600, 2700.5, 9).decided());
   EXPECT_EQ(clock(17.3, 1, 0.0125, 4).unit, 1);
   // A sketch that divides millis() by 60000: rows jitter by ms.
   std::vector<double> jitter;
   for (int k = 0; k < 2000; ++k)
     jitter.push_back(std::round((k + 0.003 * (k % 5)) / 60 * 1e7) / 1e7);
   EXPECT_EQ(from_log::rounder_unit(jitter), 60);
-  EXPECT_FALSE(from_log::judge_clock(read(jitter)).told());
+  EXPECT_FALSE(from_log::judge_clock(read(jitter)).decided());
 }
 
 // A date that few have is no date where a clock that has run for days is as likely.
 TEST(Clock, CountersOfWeeksAreNoDatesOfOldEpochs) {
   const double at = 40 * day + 1.25;
-  EXPECT_FALSE(from_log::judge_clock(read(written(at, 1e-6, 0.025, 2000, 0))).told());
-  EXPECT_FALSE(from_log::judge_clock(read(written(at, 1e-9, 0.025, 2000, 0))).told());
-  EXPECT_FALSE(from_log::judge_clock(read(written(at, 60, 0.125, 2000, 8))).told());
+  EXPECT_FALSE(from_log::judge_clock(read(written(at, 1e-6, 0.025, 2000, 0))).decided());
+  EXPECT_FALSE(from_log::judge_clock(read(written(at, 1e-9, 0.025, 2000, 0))).decided());
+  EXPECT_FALSE(from_log::judge_clock(read(written(at, 60, 0.125, 2000, 8))).decided());
   // Thirty days in minutes are 2018 in days of a spreadsheet, with rows of 24 minutes.
-  EXPECT_FALSE(from_log::judge_clock(read(written(30 * day, 60, 1, 2000, 8))).told());
+  EXPECT_FALSE(from_log::judge_clock(read(written(30 * day, 60, 1, 2000, 8))).decided());
   // Seconds since 1904 of LabVIEW: so, and with an alarm where they may be ms.
   const auto lab = [](double T, int decimals) {
     return from_log::judge_clock(read(written(120.9 * year, 1, T, 2000, decimals)));

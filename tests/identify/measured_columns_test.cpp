@@ -92,7 +92,7 @@ TEST(MeasuredColumns, GainLagAndDeadTimeOfEach) {
   EXPECT_TRUE(covers(found->input_gain, b0));
   for (std::size_t c = 0; c < ways.size(); ++c) {
     const auto& effect = found->columns[c];
-    EXPECT_TRUE(effect.told() && effect.timed && !effect.follows_output);
+    EXPECT_TRUE(effect.seen() && effect.timed && !effect.follows_output);
     EXPECT_TRUE(covers(effect.gain, ways[c].gain));
     EXPECT_LT(effect.gain.share(), 0.15);
     // It is held from its row to the next: half a row later than a straight line.
@@ -130,7 +130,7 @@ TEST(MeasuredColumns, WhatCannotBeTold) {
   const auto idle = esokit::study(log, first_order());
   ASSERT_TRUE(idle);
   EXPECT_TRUE(idle->columns[0].timed);
-  EXPECT_FALSE(idle->columns[1].told());
+  EXPECT_FALSE(idle->columns[1].seen());
   EXPECT_FALSE(idle->columns[1].timed);
   EXPECT_EQ(idle->columns[1].lag.value, 0);
   EXPECT_TRUE(covers(idle->columns[1].gain, 0));

@@ -93,7 +93,7 @@ struct ClockVerdict {
   bool date = false;           ///< since 1970, 1904, 1900, ..
   bool doubtful = false;       ///< another unit is possible: an alarm
   std::vector<double> open{};  ///< units that are possible, s: those to ask for
-  [[nodiscard]] bool told() const { return unit > 0; }
+  [[nodiscard]] bool decided() const { return unit > 0; }
 };
 
 namespace detail {
@@ -229,7 +229,7 @@ inline ClockVerdict judge_fractions(const ClockRead& read, const std::vector<dou
   if (read.step < 0.9995 || read.pace == Pace::slow) return found;
   if (read.pace == Pace::unknown && read.steady && even) return found;
   found.unit = read.pace == Pace::quick && usual_rows(read.step * 1e-3, read.pace) ? 1e-3 : 0;
-  found.doubtful = found.told();
+  found.doubtful = found.decided();
   return found;
 }
 

@@ -353,7 +353,7 @@ std::vector<Feed> Feed::make(const Input& input, const esokit::Identified& found
   const double T = model.sample_time;
   for (std::size_t c = 0; c < found.columns.size(); ++c) {
     const esokit::MeasuredEffect& effect = found.columns[c];
-    if (!effect.told() || effect.follows_output) continue;
+    if (!effect.seen() || effect.follows_output) continue;
     const auto& w = rows.columns[c];
     double mean = 0.0;
     for (const double value : w) mean += value / static_cast<double>(w.size());

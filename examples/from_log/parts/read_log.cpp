@@ -274,7 +274,7 @@ double find_unit(const Settings& settings, const LogFile& file, const ClockRead&
     return named;
   }
   const ClockVerdict verdict = judge_clock(clock);
-  if (!verdict.told()) {
+  if (!verdict.decided()) {
     const bool counted =
         clock.whole && clock.first < 1.5 && clock.first > -0.5 && std::abs(clock.step - 1.0) < 1e-9;
     throw LogError(settings.file + ": in which unit is the time? " +

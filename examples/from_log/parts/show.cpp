@@ -263,7 +263,7 @@ std::vector<CsvRow> model_table(const Input& input, const Findings& findings) {
     const std::string name = input.measured[c];
     rows.push_back(
         {name, with_interval(effect.gain), "[" + highest + "] / its unit",
-         "what one unit of it adds to " + highest + (effect.told() ? "" : "; it may be nothing")});
+         "what one unit of it adds to " + highest + (effect.seen() ? "" : "; it may be nothing")});
     if (!effect.timed) {
       rows.push_back({name + ": lag, dead time", "not found", "",
                       effect.follows_output ? "it is a function of y, and acts at once"

@@ -165,15 +165,15 @@ requires(detail::goes_into_a_loop<Observer>()) class Guarded
       return predicted | correct(y);
     }
     const Found before = found();
-    const StepStatus status = observer_.update(y, S(u_applied * told_ratio_));
-    told_ratio_ = gain_ratio_;
+    const StepStatus status = observer_.update(y, S(u_applied * given_ratio_));
+    given_ratio_ = gain_ratio_;
     keep_guards(before, status);
     return status;
   }
 
   /// Time update only, see PredictorCorrector::predict.
   StepStatus predict(S u_applied) noexcept {
-    const S told = u_applied * told_ratio_;
+    const S told = u_applied * given_ratio_;
     const StepStatus status =
         gates && weights_.held ? predict_standing(told) : observer_.predict(told);
     if (takes_measured) keep_bound();
@@ -250,7 +250,7 @@ requires(detail::goes_into_a_loop<Observer>()) class Guarded
           configured_gain(), true};
     }
     // With a model the sample that ends now still has the previous b0.
-    const S change = on_chain ? S(ratio * input_factor_) : S(ratio / told_ratio_);
+    const S change = on_chain ? S(ratio * input_factor_) : S(ratio / given_ratio_);
     if (!on_chain || set_.unit == DisturbanceUnit::input) {
       const auto next = rescaled(change);
       if (!detail::GuardAccess::finite(observer_, next)) {
@@ -373,19 +373,19 @@ requires(detail::goes_into_a_loop<Observer>()) class Guarded
 
   /// Whether the next sample has another b0.
   [[nodiscard]] ESOKIT_INLINE bool changes_gain() const noexcept {
-    return told_ratio_ < gain_ratio_ || told_ratio_ > gain_ratio_;
+    return given_ratio_ < gain_ratio_ || given_ratio_ > gain_ratio_;
   }
 
   /// Puts the b0 of `set_input_gain` into effect.
   ESOKIT_INLINE void take_gain() noexcept {
     if (!on_chain && changes_gain()) [[unlikely]] {
-      const auto next = rescaled(S(gain_ratio_ / told_ratio_));
+      const auto next = rescaled(S(gain_ratio_ / given_ratio_));
       if (detail::GuardAccess::finite(observer_, next)) {
         detail::GuardAccess::states(observer_) = next;
       }
       renew_bound();
     }
-    told_ratio_ = gain_ratio_;
+    given_ratio_ = gain_ratio_;
   }
 
   /// After a restart at a given estimate.
@@ -485,7 +485,7 @@ requires(detail::goes_into_a_loop<Observer>()) class Guarded
   S bound_in_force_;       ///< unit of y^(n), at the present b0; 0: none
   S limit_;                ///< the same, scaled
   S gain_ratio_ = S(1);    ///< present b0 divided by b0 of the config
-  S told_ratio_ = S(1);    ///< gain_ratio when the law computed the u that comes next
+  S given_ratio_ = S(1);   ///< gain_ratio when the law computed the u that comes next
   S input_factor_ = S(1);  ///< 1 / gain_ratio
   Set set_;
   detail::CorrectionWeights<S> weights_{};

@@ -142,7 +142,7 @@ requires(detail::shifts_output<Observer>()) class WrappedOutput
 
   /// A second count over all measurements, including those that a gate rejects. The gate decides by
   /// the estimate, so turns counted between accepted measurements only could stay wrong forever.
-  struct Heard {
+  struct Seen {
     Count count{};
     std::uint16_t at = 0;       ///< missed() at the last measurement
     std::uint8_t steady = 0;    ///< consecutive measurements that moved as before, at most 255
@@ -169,7 +169,7 @@ requires(detail::shifts_output<Observer>()) class WrappedOutput
     bool usable = false;   ///< small enough to determine its turn
     bool fits = true;      ///< it moved as expected
     bool counted = false;  ///< false: the turn follows from the prediction
-    bool heard = false;    ///< its turn is counted from rejected measurements
+    bool seen = false;     ///< its turn is counted from rejected measurements
   };
 
   static constexpr std::uint16_t none = 65535;
@@ -208,13 +208,12 @@ requires(detail::shifts_output<Observer>()) class WrappedOutput
     Reading reading = read(count_, y, missed);
     reading.missed = missed;
     if constexpr (gated) {
-      if (heard_.rejected > 0 && heard_.steady >= enough_steady &&
-          heard_.steady >= heard_.rejected) {
-        Reading heard = read(heard_.count, y, missed - heard_.at);
-        if (!heard.fits || !heard.counted) return reading;
-        heard.missed = missed;
-        heard.heard = true;
-        return heard;
+      if (seen_.rejected > 0 && seen_.steady >= enough_steady && seen_.steady >= seen_.rejected) {
+        Reading seen = read(seen_.count, y, missed - seen_.at);
+        if (!seen.fits || !seen.counted) return reading;
+        seen.missed = missed;
+        seen.seen = true;
+        return seen;
       }
     }
     return reading;
@@ -271,17 +270,17 @@ requires(detail::shifts_output<Observer>()) class WrappedOutput
       return status;
     }
     if (!reading.fits) status |= StepStatus::turn_assumed;
-    if (!reading.heard) learn(count_, reading);
+    if (!reading.seen) learn(count_, reading);
     if constexpr (gated) {
       hear(reading);
       // Turns are counted from the measurements that the observer has used.
-      if (reading.heard) {
-        count_ = heard_.count;
+      if (reading.seen) {
+        count_ = seen_.count;
       } else {
-        heard_.count.turns = count_.turns;
+        seen_.count.turns = count_.turns;
       }
-      heard_.at = 0;
-      heard_.rejected = 0;
+      seen_.at = 0;
+      seen_.rejected = 0;
     }
     recentre();
     return status;
@@ -289,12 +288,12 @@ requires(detail::shifts_output<Observer>()) class WrappedOutput
 
   void hear(const Reading& taken) noexcept {
     if constexpr (gated) {
-      const Reading reading = read(heard_.count, taken.y, taken.missed - heard_.at);
-      const bool steady = reading.fits && heard_.count.samples != none;
-      heard_.steady = steady ? one_more(heard_.steady) : std::uint8_t{0};
-      heard_.rejected = one_more(heard_.rejected);
-      heard_.at = static_cast<std::uint16_t>(taken.missed);
-      learn(heard_.count, reading);
+      const Reading reading = read(seen_.count, taken.y, taken.missed - seen_.at);
+      const bool steady = reading.fits && seen_.count.samples != none;
+      seen_.steady = steady ? one_more(seen_.steady) : std::uint8_t{0};
+      seen_.rejected = one_more(seen_.rejected);
+      seen_.at = static_cast<std::uint16_t>(taken.missed);
+      learn(seen_.count, reading);
     }
   }
 
@@ -333,7 +332,7 @@ requires(detail::shifts_output<Observer>()) class WrappedOutput
 
   void forget() noexcept {
     count_ = Count{};
-    heard_ = {};
+    seen_ = {};
   }
 
   StepStatus begin(StepStatus status) noexcept {
@@ -348,14 +347,14 @@ requires(detail::shifts_output<Observer>()) class WrappedOutput
     const S turns = (std::round)(z * inverse_period_);
     if (observer_.shift_output(-(turns * period_)) != StepStatus::ok) return;
     count_.turns -= turns;
-    if constexpr (gated) heard_.count.turns -= turns;
+    if constexpr (gated) seen_.count.turns -= turns;
   }
 
   S period_;
   S inverse_period_;
   Count count_{};
   struct Nothing {};
-  [[no_unique_address]] std::conditional_t<gated, Heard, Nothing> heard_{};
+  [[no_unique_address]] std::conditional_t<gated, Seen, Nothing> seen_{};
 };
 
 /// Distinguishes the type in snapshots.

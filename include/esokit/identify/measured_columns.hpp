@@ -29,8 +29,8 @@ struct MeasuredEffect {
   bool follows_output = false;  ///< it is a function of y
   std::size_t lost = 0;         ///< rows in which w was missing, and lies between its neighbours
 
-  /// Whether the log tells the gain: its interval does not contain zero.
-  [[nodiscard]] bool told() const { return gain.half_width < (std::abs)(gain.value); }
+  /// Whether the effect is seen in the log: its interval does not contain zero.
+  [[nodiscard]] bool seen() const { return gain.half_width < (std::abs)(gain.value); }
   /// The settings of `Measured`, where w is held from its sample to the next: half a sample less of
   /// latency, first of dead time, then of lag.
   /// @param sample_time s @param input_latency how much later u acts than the observer knows, s:

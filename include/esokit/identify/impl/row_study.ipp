@@ -383,7 +383,7 @@ ESOKIT_FUNCTION MeasuredEffect RowStudy::late_effect(MeasuredEffect effect, std:
   effect.dead_time = late(
       column.dead_time(), [](const Times& x) { return x.latency - x.lag; },
       [&](const SplitCovariance& of) { return split(of).second; });
-  effect.timed = effect.told() && effect.latency.half_width < bounds_.latency_max;
+  effect.timed = effect.seen() && effect.latency.half_width < bounds_.latency_max;
   if (!effect.timed) effect.latency = effect.lag = effect.dead_time = {};
   return effect;
 }

@@ -474,10 +474,10 @@ struct RecordAccess {
     wrap.count = counted(o.count_);
     if constexpr (O::gated) {
       wrap.gated = true;
-      wrap.heard = counted(o.heard_.count);
-      wrap.heard_at = o.heard_.at;
-      wrap.heard_steady = o.heard_.steady;
-      wrap.heard_rejected = o.heard_.rejected;
+      wrap.seen = counted(o.seen_.count);
+      wrap.seen_at = o.seen_.at;
+      wrap.seen_steady = o.seen_.steady;
+      wrap.seen_rejected = o.seen_.rejected;
     }
     return wrap;
   }
@@ -508,7 +508,7 @@ struct RecordAccess {
             number(o.configured_gain()),
             number(set.inverse_gain),
             number(o.gain_ratio_),
-            number(o.told_ratio_),
+            number(o.given_ratio_),
             number(o.input_factor_),
             number(now.up),
             number(now.down),

@@ -102,10 +102,10 @@ struct WrapNumbers {
   double most_turns = 0;  ///< more cannot be distinguished
   TurnNumbers count{};
   bool gated = false;  ///< around a gate: the rest counts over all measurements
-  TurnNumbers heard{};
-  unsigned heard_at = 0;
-  unsigned heard_steady = 0;
-  unsigned heard_rejected = 0;
+  TurnNumbers seen{};
+  unsigned seen_at = 0;
+  unsigned seen_steady = 0;
+  unsigned seen_rejected = 0;
   std::string angle{};  ///< the estimate that the law subtracts from the reference
 };
 
@@ -121,7 +121,7 @@ struct GuardNumbers {
   double gain = 1;            ///< b0 of the observer
   double inverse_gain = 1;
   double gain_ratio = 1;  ///< see Guarded, as what follows
-  double told_ratio = 1;
+  double given_ratio = 1;
   double input_factor = 1;
   double weight_up = 1;
   double weight_down = 1;

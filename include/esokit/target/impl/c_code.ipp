@@ -349,7 +349,7 @@ class CDesign {
       count(of + "newest", path.memory.size() - 1);
     }
     if (d.measured.on) {
-      real("w_told", d.measured.told);
+      real("w_given", d.measured.told);
       count("w_is_new", 0);
     }
     if (d.law.kind == RunningLaw::schedule) {
@@ -375,10 +375,10 @@ class CDesign {
     };
     add("taken.", wrap.count);
     if (!wrap.gated) return;
-    add("seen.", wrap.heard);
-    count("seen_at", wrap.heard_at);
-    count("seen_steady", wrap.heard_steady);
-    count("seen_rejected", wrap.heard_rejected);
+    add("seen.", wrap.seen);
+    count("seen_at", wrap.seen_at);
+    count("seen_steady", wrap.seen_steady);
+    count("seen_rejected", wrap.seen_rejected);
   }
 
   void set_found() {
@@ -387,7 +387,7 @@ class CDesign {
     real("weight_up", guard.weight_up);
     real("weight_down", guard.weight_down);
     real("gain_ratio", guard.gain_ratio);
-    real("told_ratio", guard.told_ratio);
+    real("given_ratio", guard.given_ratio);
     real("input_factor", guard.input_factor);
     count("settling_left", guard.settling_left);
     count("release_left", guard.release_left);

@@ -111,7 +111,7 @@ typedef struct {
 #endif
 #if ESOKIT_MEASURED
   esokit_w w[W_COUNT];
-  real w_told; /* their part of the disturbance */
+  real w_given; /* their part of the disturbance */
   uint8_t w_is_new;
 #endif
 #if ESOKIT_GUARDED
@@ -119,7 +119,7 @@ typedef struct {
   real weight_up;
   real weight_down;
   real gain_ratio;
-  real told_ratio;
+  real given_ratio;
   real input_factor;
   uint32_t settling_left;
   uint16_t release_left;

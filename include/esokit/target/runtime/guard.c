@@ -111,7 +111,7 @@ static unsigned predict_standing(esokit_state *o, real u)
   real expected = 0.0;
   unsigned status;
   get_state(o, x);
-  status = predict_outside(o, u * o->told_ratio);
+  status = predict_outside(o, u * o->given_ratio);
   if ((status & ESOKIT_PREDICTION_DROPPED) == 0u) {
     unsigned i;
     expected = predicted_from(o, x, o->u_applied);
@@ -124,7 +124,7 @@ static unsigned predict_standing(esokit_state *o, real u)
     get_disturbance(o, d);
     stand(o, x[0] + (o->DESIGN_Y - expected), d);
   }
-  o->told_ratio = o->gain_ratio;
+  o->given_ratio = o->gain_ratio;
   return status;
 }
 
@@ -155,8 +155,8 @@ static unsigned predict_guarded(esokit_state *o, real u)
   if (o->held != 0u) {
     return predict_standing(o, u);
   }
-  status = predict_outside(o, u * o->told_ratio);
-  o->told_ratio = o->gain_ratio;
+  status = predict_outside(o, u * o->given_ratio);
+  o->given_ratio = o->gain_ratio;
   return status;
 }
 
@@ -182,8 +182,8 @@ static unsigned update_guarded(esokit_state *o, real y, real u)
     return status | correct_guarded(o, y);
   }
   get_disturbance(o, before);
-  status = update_outside(o, y, u * o->told_ratio);
-  o->told_ratio = o->gain_ratio;
+  status = update_outside(o, y, u * o->given_ratio);
+  o->given_ratio = o->gain_ratio;
   keep_guards(o, before, status);
   return status;
 }

@@ -72,10 +72,10 @@ static void advance_measured(esokit_state *o)
   }
   o->w_is_new = 0u;
   now = effect_of_w(o);
-  more = now - o->w_told;
+  more = now - o->w_given;
   if ((more < 0.0) || (more > 0.0)) {
     if (load(o, more)) {
-      o->w_told = now;
+      o->w_given = now;
     }
   }
 }
@@ -93,7 +93,7 @@ static void settle_measured(esokit_state *o)
     }
     o->w[i].lagged = w;
   }
-  o->w_told = effect_of_w(o);
+  o->w_given = effect_of_w(o);
 }
 
 #endif
