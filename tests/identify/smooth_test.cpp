@@ -333,4 +333,83 @@ TEST(Smooth, RefusesByRule) {
             "y: gives estimates that the scalar cannot hold");
 }
 
+/// Two recordings in one log: what lies between them tells nothing of the noise.
+TEST(Smooth, FindsTheNoiseBesideAPause) {
+  Made m = made(chain(2, 1, 3.0), 2000, 0.003, 0.4, 5, false);
+  for (std::size_t k = 1000; k < 2000; ++k) m.log.time[k] += 1000.0;
+  const auto found = smooth(m.log, observer<2>(3.0)).value();
+  EXPECT_NEAR(*found.noise.measurement, 0.003, 0.1 * 0.003);
+  EXPECT_EQ(found.bridged, 50'000u);
+}
+
+/// Backwards a state that fades grows: what no disturbance holds is lost in roundings.
+TEST(Smooth, RefusesWhatFadesForTooLong) {
+  const auto errors = [](const auto& fading, std::size_t rows, double disturbance) {
+    Log log;
+    double y = 0.0;
+    for (std::size_t k = 0; k < rows; ++k) {
+      log.u.push_back(std::sin(0.13 * static_cast<double>(k)));
+      log.y.push_back(y += T * std::cos(0.02 * static_cast<double>(k)));
+    }
+    return refusal(smooth(log, fading, {.measurement = 0.01, .disturbance = disturbance}));
+  };
+  const auto too_long =
+      "y: has too many samples for a model with an actuator, or with poles and disturbance 0: "
+      "leave it out, or filter u by it";
+  const auto lag =
+      ModelEso<ModelParts{.order = 2, .actuator = 1}>::make({.observer_bandwidth = 10.0,
+                                                             .input_gain = 3.0,
+                                                             .sample_time = T,
+                                                             .model = {.actuator = {0.1}}})
+          .value();
+  EXPECT_EQ(errors(lag, 50, 1.0), "accepted");
+  for (const std::size_t rows : {500u, 2000u, 20'000u}) EXPECT_EQ(errors(lag, rows, 1.0), too_long);
+  const auto pole =
+      ModelEso<ModelParts{.order = 2, .plant_poles = true}>::make({.observer_bandwidth = 10.0,
+                                                                   .input_gain = 3.0,
+                                                                   .sample_time = T,
+                                                                   .model = {.plant = {0.0, 4.0}}})
+          .value();
+  EXPECT_EQ(errors(pole, 2000, 1.0), "accepted");
+  EXPECT_EQ(errors(pole, 2000, 0.0), too_long);
+  const auto part =
+      ModelEso<ModelParts{.order = 2, .first_order = 1}>::make({.observer_bandwidth = 10.0,
+                                                                .input_gain = 3.0,
+                                                                .sample_time = T,
+                                                                .model = {.first_order = {0.3}}})
+          .value();
+  EXPECT_EQ(errors(part, 2000, 1.0), "accepted");
+  EXPECT_EQ(errors(observer<2>(3.0), 20'000, 0.0), "accepted");
+}
+
+TEST(Smooth, RefusesAnotherClock) {
+  const Log good = made(chain(2, 1, 3.0), 200, 0.01, 0.5, 4, false).log;
+  const auto with = [&](const auto& change, double noise = 0.01) {
+    Log log = good;
+    change(log);
+    return refusal(smooth(log, observer<2>(3.0), {.measurement = noise}));
+  };
+  for (const double factor : {0.7, 0.97, 1.03, 1.3, 2.4}) {
+    EXPECT_EQ(
+        with([&](Log& log) {
+          for (double& time : log.time) time = factor * (time - 1.7e9);
+        }),
+        "time: has a mean step, in whole samples, other than the sample time of the observer");
+  }
+  EXPECT_EQ(with([](Log& log) {
+              for (double& time : log.time) time = 2.0 * (time - 1.7e9);
+            }),
+            "accepted");
+  EXPECT_EQ(with([](Log& log) { log.time[0] = nan; }), "time[0]: must be finite");
+  for (const double bad : {-T, nan}) {
+    EXPECT_EQ(with([&](Log& log) { log.sample_time = bad; }),
+              "sample_time: must be finite and not negative");
+  }
+  for (const double noise : {1e-160, 1e160}) {
+    EXPECT_EQ(with([](Log&) {}, noise), "measurement: must have a square that the scalar can hold");
+  }
+  EXPECT_EQ(refusal(smooth(good, observer<2>(1e300))),
+            "y: gives estimates that the scalar cannot hold");
+}
+
 }  // namespace identify_smooth_test

@@ -114,6 +114,10 @@ Expected<SmoothedLog, Error<double>> smooth(const Log& log, const SmoothModel& m
 ///
 /// Rows without a finite y, and rows that the time stamps say are missing, are predicted, however
 /// long. A u that is not finite is that of the row before.
+///
+/// An actuator in the model makes the way back unstable, as do poles of the plant if `disturbance`
+/// is 0: such a log may have only some of their time constants. Filter u by the actuator instead,
+/// and take an observer without it.
 /// @param log time, u, y; steps of whole samples of the observer, within half a sample. For others
 ///        `prepare` first
 /// @param observer a LinearEso, CascadeEso, ModelEso, .., also in a DelayedInput. Its model counts,

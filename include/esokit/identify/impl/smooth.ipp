@@ -30,12 +30,14 @@ inline Expected<SampledLog, Error<double>> sampled_log(const Log& log, const Smo
                as_number(rows), true})
       .demand(log.columns.empty(), "columns", as_number(log.columns.size()),
               "must be left out: add what is known to u, in its unit")
+      .not_negative("sample_time", log.sample_time)
       .demand(
           !log.time.empty() || !(log.sample_time > 0.0) ||
               std::abs(log.sample_time - T) <= 0.01 * T,
           {"sample_time", log.sample_time, "must be that of the observer, which is", -1, T, true});
   if (!rules) return rules.error();
   rules.finite("u", log.u[0], 0);
+  if (!log.time.empty()) rules.finite("time", log.time[0], 0);
   SampledLog all;
   std::vector<double> held;
   double u = 0.0;
@@ -62,6 +64,15 @@ inline Expected<SampledLog, Error<double>> sampled_log(const Log& log, const Smo
     all.y.push_back(log.y[k]);
     held.push_back(u);
     if (is_finite(log.y[k])) ++all.measured;
+  }
+  if (rules && !log.time.empty()) {
+    // Each step may be anything near whole samples, all together may not.
+    const double duration = log.time[rows - 1] - log.time[0];
+    const double samples = as_number(held.size() - 1);
+    rules.demand(std::abs(duration - samples * T) <= (1.0 + 0.01 * samples) * T,
+                 {"time", duration / samples,
+                  "has a mean step, in whole samples, other than the sample time of the observer",
+                  -1, T, true});
   }
   const std::size_t states = model.units.size();
   rules.demand(all.measured > states,
@@ -186,12 +197,16 @@ struct Likelihood {
 inline Likelihood likelihood(const SampledLog& log, const SmoothModel& model, double walk) {
   InformationArray known(model, walk);
   Likelihood found;
-  // The middle of a long log says as much.
+  // The middle of the measurements of a long log says as much. Not that of its samples: they may be
+  // a pause between two recordings.
   constexpr std::size_t most = 20'000;
-  const std::size_t first = log.y.size() > most ? (log.y.size() - most) / 2 : 0;
-  const std::size_t end = (std::min)(log.y.size(), first + most);
-  for (std::size_t k = first; k < end; ++k) {
+  std::size_t skip = log.measured > most ? (log.measured - most) / 2 : 0;
+  std::size_t left = (std::min)(log.measured, most);
+  std::size_t k = 0;
+  for (; skip > 0; ++k) skip -= is_finite(log.y[k]) ? 1 : 0;
+  for (; left > 0; ++k) {
     if (is_finite(log.y[k])) {
+      --left;
       const bool whole = known.whole();
       const auto innovation = known.measure(log.y[k]);
       if (whole) {
@@ -262,6 +277,15 @@ class WayBack {
   std::vector<double> numbers_;
 };
 
+/// One sample back, x = a x + what u and w do. @param row of `WayBack`
+inline DynamicMatrix<double> way_back(const InformationArray& known, const double* row) {
+  DynamicMatrix<double> a = known.back();
+  for (int i = 0; i < a.rows(); ++i) {
+    for (int j = 0; j < a.rows(); ++j) a(i, j) += known.of_w(i) * row[j + 1] / row[0];
+  }
+  return a;
+}
+
 /// x and its covariance, in units of the noise on y.
 struct SmoothedState {
   std::vector<double> x;
@@ -308,14 +332,11 @@ struct SmoothedState {
     const int n = p.rows();
     const double r_w = row[0];
     const double z_w = row[n + 1];
-    DynamicMatrix<double> a(n, n);
+    const DynamicMatrix<double> a = way_back(known, row);
     std::vector<double> next(x.size());
     for (int i = 0; i < n; ++i) {
       double sum = -known.of_u(i) * u - known.of_w(i) * z_w / r_w;
-      for (int j = 0; j < n; ++j) {
-        a(i, j) = known.back()(i, j) + known.of_w(i) * row[j + 1] / r_w;
-        sum += a(i, j) * x[static_cast<std::size_t>(j)];
-      }
+      for (int j = 0; j < n; ++j) sum += a(i, j) * x[static_cast<std::size_t>(j)];
       next[static_cast<std::size_t>(i)] = sum;
     }
     const auto half = product(a, p);
@@ -330,28 +351,68 @@ struct SmoothedState {
   }
 };
 
+/// True if u drives a state that fades and that no w drives: on the way back over so many samples
+/// an error of u grows by more than 1e12. Those of integrators grow by a power of the samples, less
+/// than twice by 1e6.
+inline bool fades(const SmoothModel& model, bool walks, std::size_t samples) {
+  const int n = model.phi.rows();
+  InformationArray known(model, walks ? 1.0 : 0.0);
+  DynamicMatrix<double> error(n, 1);
+  for (int i = 0; i < n; ++i) error(i, 0) = known.of_u(i);
+  const auto size = [&] {
+    double sum = 0.0;
+    for (int i = 0; i < n; ++i) sum += std::abs(error(i, 0));
+    return sum;
+  };
+  double half = 0.0;
+  std::vector<double> row(static_cast<std::size_t>(n) + 1);
+  for (std::size_t k = 0; k < samples; ++k) {
+    if (k == samples / 2) half = size();
+    known.measure(0.0);
+    known.predict(0.0);
+    for (int j = 0; j <= n; ++j) row[static_cast<std::size_t>(j)] = known.array()(0, j);
+    error = product(way_back(known, row.data()), error);
+  }
+  const double end = size();
+  return !is_finite(end) || end > 1e6 * half;
+}
+
 ESOKIT_FUNCTION Expected<SmoothedLog, Error<double>> smooth(const Log& log,
                                                             const SmoothModel& model,
                                                             const SmoothNoise& noise) {
   Rules<double> rules;
-  if (noise.measurement) rules.positive("measurement", *noise.measurement);
+  if (noise.measurement) {
+    const double variance = *noise.measurement * *noise.measurement;
+    rules.positive("measurement", *noise.measurement)
+        .demand(normal(variance), "measurement", *noise.measurement,
+                "must have a square that the scalar can hold");
+  }
   if (noise.disturbance) rules.not_negative("disturbance", *noise.disturbance);
   if (!rules) return rules.error();
   const auto sampled = sampled_log(log, model);
   if (!sampled) return sampled.error();
   const double T = model.sample_time;
+  const bool walks = !noise.disturbance || *noise.disturbance > 0.0;
+  rules.demand(
+      !fades(model, walks, sampled->y.size()), "y", static_cast<double>(sampled->y.size()),
+      "has too many samples for a model with an actuator, or with poles and disturbance 0: "
+      "leave it out, or filter u by it");
+  if (!rules) return rules.error();
   SmoothVariances variances{};
   if (noise.measurement && noise.disturbance) {
     variances = {*noise.measurement * *noise.measurement, *noise.disturbance * T};
-  } else if (noise.disturbance && !(*noise.disturbance > 0.0)) {
+  } else if (!walks) {
     const Likelihood found = likelihood(*sampled, model, 0.0);
     variances = {found.squares / found.rows, 0.0};
   } else {
     variances = likely_noise(*sampled, model, noise);
   }
+  constexpr const char* too_large = "gives estimates that the scalar cannot hold";
   rules
-      .demand(is_finite(variances.measurement) && variances.measurement > 0.0, "y",
-              variances.measurement, "must have noise: give its standard deviation")
+      .demand(is_finite(variances.measurement) || !(std::abs(variances.measurement) > 0.0), "y",
+              variances.measurement, too_large)
+      .demand(variances.measurement > 0.0, "y", variances.measurement,
+              "must have noise: give its standard deviation")
       .finite("disturbance", variances.walk);
   if (!rules) return rules.error();
   const int n = model.phi.rows();
@@ -386,7 +447,7 @@ ESOKIT_FUNCTION Expected<SmoothedLog, Error<double>> smooth(const Log& log,
     for (const auto& list : found.deviations) finite = finite && is_finite(list[row]);
     for (const auto& list : found.estimates) finite = finite && is_finite(list[row]);
   }
-  rules.demand(finite, "y", log.y[0], "gives estimates that the scalar cannot hold");
+  rules.demand(finite, "y", log.y[0], too_large);
   if (!rules) return rules.error();
   return found;
 }
