@@ -423,6 +423,24 @@ TEST(Health, OnItsWayIsNoFault) {
   on_its_way_is_no_fault<2, float>();
 }
 
+/// The same for where y is going: after it a load at the limit is named as soon as without it.
+TEST(Health, AnAbsurdSampleIsNoWay) {
+  for (const double garbage : {1e6, 1e100, 1e250}) {
+    for (const double side : {1.0, -1.0}) {
+      auto loop = loop_of<double>(20);
+      auto monitor = monitor_of<double>();
+      Random random(3);
+      for (int k = 0; k < 12'000; ++k) {
+        const double y = k < 4 ? -side * garbage : 1e-3 * random.uniform(-1, 1);
+        (void)loop.update(y, side * 1e3);
+        monitor.look(loop);
+      }
+      EXPECT_GT(monitor.health().saturated, 0.6);
+      EXPECT_LT(std::abs(monitor.health().underway), 0.3) << garbage << ' ' << side;
+    }
+  }
+}
+
 /// An absurd sample is forgotten, not averaged: what comes after it tells the truth at once.
 TEST(Health, AnAbsurdSampleIsNotRemembered) {
   auto loop = loop_of<float>(20);

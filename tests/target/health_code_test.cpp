@@ -65,11 +65,11 @@ struct Found {
 /// @return how often which fault was named
 template <class C>
 std::array<int, 9> watches(double plant_gain, double bad, std::uint64_t seed, double stands = 0,
-                           bool loses = false, double load = 1) {
+                           bool loses = false, double load = 1, double gain = 8) {
   SCOPED_TRACE(testing::internal::GetTypeName<C>());
   using V = typename C::scalar_type;
   std::array<int, 9> named{};
-  auto settings = config<C>(8);
+  auto settings = config<C>(gain);
   settings.limits.rate = std::numeric_limits<V>::max();
   C mine = C::make(settings).value();
   auto watch = monitor<C>(V(1e-3));
@@ -99,7 +99,7 @@ std::array<int, 9> watches(double plant_gain, double bad, std::uint64_t seed, do
   library.find(look, "both_look");
   library.find(diagnoses, "health_diagnose");
   init(loop.data(), its.data());
-  ChainPlant plant(C::order, 0.0078125, 8 * plant_gain, 1.5);
+  ChainPlant plant(C::order, 0.0078125, gain * plant_gain, 1.5);
   Random random(seed);
   V r(1);
   int lost = 0;
@@ -165,6 +165,8 @@ TEST(HealthCode, EqualsTheMonitor) {
         << static_cast<int>(fault) << " of " << testing::PrintToString(named);
   };
   often(watches<C>(1, 0.02, 1), LoopFault::none);
+  often(watches<C>(1, 0, 1, 0, false, 1, -8), LoopFault::none);  // a negative b0
+  (void)watches<Small>(0.3, 0, 2, 0, false, 12, -8);             // at its limits
   often(watches<C>(-1, 0, 2), LoopFault::wrong_sign);
   often(watches<Small>(6, 0, 3), LoopFault::innovation_too_large);
   often(watches<Cascade>(1, 0.3, 4), LoopFault::measurements_rejected);

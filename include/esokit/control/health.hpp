@@ -499,6 +499,7 @@ requires(detail::is_a_plain_scalar<S>()) class HealthMonitor {
       return true;
     }
     for (S& stage : stages_) stage = S(0);
+    slow_y_ = std::numeric_limits<S>::quiet_NaN();
     slow_phi_ = slow_psi_ = sum_x_ = sum_xx_ = sum_xy_ = sum_aa_ = S(0);
     large_xx_ = large_xy_ = top_ = health_.opposed = health_.steady = S(0);
     return false;

@@ -118,6 +118,7 @@ static bool filter(esokit_state *o, real phi, real psi)
   for (i = 0u; i < SIZE; ++i) {
     o->stages[i] = 0.0;
   }
+  o->has_mean = false;
   o->slow_phi = 0.0;
   o->slow_psi = 0.0;
   o->sum_x = 0.0;
