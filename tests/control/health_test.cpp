@@ -482,6 +482,10 @@ TEST(Health, Diagnosis) {
   EXPECT_EQ(diagnose(health), LoopFault::innovation_too_large);
   health.bounded = 0.51;
   EXPECT_EQ(diagnose(health), LoopFault::bounded);
+  health.saturated = 0.4;  // y moves back: that does not make more of it
+  health.underway = -0.4;
+  EXPECT_EQ(diagnose(health), LoopFault::bounded);
+  health.underway = 0;
   health.saturated = 0.51;
   EXPECT_EQ(diagnose(health), LoopFault::saturated);
   health.standing = 0.991;

@@ -342,6 +342,15 @@ TEST(Smooth, FindsTheNoiseBesideAPause) {
   EXPECT_EQ(found.bridged, 50'000u);
 }
 
+/// That of a long log is looked for in its middle.
+TEST(Smooth, FindsTheNoiseOfTheMiddle) {
+  Made m = made(chain(1, 1, 3.0), 30'000, 0.003, 0.1, 5, false);
+  for (std::size_t k = 0; k < 30'000; ++k) {
+    if (k < 4000 || k >= 26'000) m.log.y[k] += k % 2 == 0 ? 0.1 : -0.1;
+  }
+  EXPECT_NEAR(*smooth(m.log, observer<1>(3.0))->noise.measurement, 0.003, 0.1 * 0.003);
+}
+
 /// Backwards a state that fades grows: what no disturbance holds is lost in roundings.
 TEST(Smooth, RefusesWhatFadesForTooLong) {
   const auto errors = [](const auto& fading, std::size_t rows, double disturbance) {
