@@ -159,6 +159,72 @@ TEST(Resting, RefusesByName) {
   EXPECT_EQ(refused(divided), "accepted");
 }
 
+/// The longest time that is accepted ends: one sample more than 16 bits hold.
+TEST(Resting, AtTheLongestTime) {
+  auto c = Axis<>::make(config(1, 65.5345)).value();
+  for (int k = 0; k < 65535; ++k) c.update(0, 0);
+  EXPECT_EQ(c.mode(), LoopMode::running);
+  c.update(0, 0);
+  EXPECT_EQ(c.mode(), LoopMode::rest);
+}
+
+/// A part of a sample counts as part, and a whole one not more than once.
+TEST(Resting, RoundsItsTimeUp) {
+  for (const auto& [samples, most] : {std::pair(2.5, 3), {3.0, 3}, {3.0005, 3}, {3.01, 4}}) {
+    auto c = Axis<>::make(config(1, samples * T)).value();
+    for (int k = 0; k < most; ++k) c.update(0, 0);
+    EXPECT_EQ(c.mode(), LoopMode::running) << samples;
+    c.update(0, 0);
+    EXPECT_EQ(c.mode(), LoopMode::rest) << samples;
+  }
+}
+
+/// What comes too soon is no sample: it neither counts towards rest nor ends it.
+TEST(Resting, NoTimeChangesNothing) {
+  using C = Resting<Adrc<VariableTime<LinearEso<2>>>>;
+  auto c = C::make({.controller = {.observer = {.observer = config().controller.observer},
+                                   .controller_bandwidth = 20},
+                    .rest = {.error = 0.1, .time = 3 * T}})
+               .value();
+  const auto soon = [&] {
+    ASSERT_TRUE(c.elapsed(0));
+    const double u = c.output();
+    const LoopMode mode = c.mode();
+    for (const double y : {1.0, 70.0, hidden_nan<double>()}) EXPECT_EQ(c.update(y, 1), u);
+    EXPECT_EQ(c.update(1, 7), u);
+    EXPECT_EQ(c.update_without_measurement(8), u);
+    EXPECT_EQ(c.mode(), mode);
+  };
+  c.start(1, 0.5);
+  for (int k = 0; k < 10; ++k) {
+    soon();
+    ASSERT_TRUE(c.elapsed(T));
+    c.update(1, 1);
+    EXPECT_EQ(c.mode() == LoopMode::rest, k >= 4) << k;
+  }
+  soon();
+}
+
+/// Lost samples and safe mode are no time in the band; one sample beyond it begins anew.
+TEST(Resting, CountsGoodSamplesInARow) {
+  auto settings = config(0.25, 4 * T);
+  settings.controller.missing = {.most = 2, .input = -1.5};
+  auto c = Axis<>::make(settings).value();
+  c.start(1, 0.5);
+  const auto samples = [&](std::initializer_list<double> ys) {
+    for (const double y : ys) {
+      c.update(y, 1);
+      EXPECT_NE(c.mode(), LoopMode::rest);
+    }
+  };
+  const double lost = hidden_nan<double>();
+  samples({1, 1, lost, 1, 1, lost, 1, 1.3, 1, 1, 1, 1, lost, lost, lost});
+  ASSERT_EQ(c.mode(), LoopMode::safe);
+  samples({1, 1, 1, 1, 1});
+  c.update(1, 1);
+  EXPECT_EQ(c.mode(), LoopMode::rest);
+}
+
 /// How far an axis gets that was at `speed` when it left the band: by a loop of omega_c = 20 rad/s,
 /// from an estimate that lags 3 / omega_o.
 double beyond(double speed) { return speed * (1 / (std::exp(1) * 20) + 3.0 / 150); }

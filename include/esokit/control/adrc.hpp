@@ -266,6 +266,8 @@ requires(detail::goes_into_a_loop<Observer>()) class Adrc {
   [[nodiscard]] StatusType status() const noexcept { return loop_.status(); }
   /// Whether u is determined by the law, the start hold or the rule for missing measurements.
   [[nodiscard]] Lanes<LoopMode, S> mode() const noexcept { return loop_.mode(); }
+  /// Whether too little time has passed for a sample, see `elapsed`: `update` changes nothing.
+  [[nodiscard]] bool too_soon() const noexcept { return loop_.too_soon(); }
   /// k_0 .. k_(n-1).
   [[nodiscard]] const Array<S, order>& gains() const noexcept { return law_.gains(); }
   /// s: the part of its bandwidth that the law has left, 1 unless it is softened, see Softening.

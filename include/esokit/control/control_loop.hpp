@@ -373,6 +373,15 @@ class ControlLoop {
   [[nodiscard]] Lanes<LoopMode, S> mode() const noexcept { return mode_; }
   /// D: a measurement is due at every D-th step.
   [[nodiscard]] Lanes<int, S> measurement_divider() const noexcept { return set_.divider; }
+  /// Whether no time has passed, or too little for a step, see `elapsed`: the next step changes
+  /// nothing.
+  [[nodiscard]] bool too_soon() const noexcept {
+    if constexpr (has_step_time) {
+      return steps_.due == 0;
+    } else {
+      return false;
+    }
+  }
   /// The limits, and what the actuator holds.
   [[nodiscard]] const Limiter<S>& limiter() const noexcept { return limiter_; }
 
@@ -528,15 +537,6 @@ class ControlLoop {
     if (status_ == StepStatus::ok && mode_ == LoopMode::running) return;
     after_trouble(measured);
     if (as_planned && status_ == StepStatus::gap_bridged) status_ = StepStatus::ok;
-  }
-
-  /// Whether no time has passed, or too little for a step.
-  [[nodiscard]] bool too_soon() const noexcept {
-    if constexpr (has_step_time) {
-      return steps_.due == 0;
-    } else {
-      return false;
-    }
   }
 
   /// All steps since the last one, but for the one that is to follow.

@@ -183,6 +183,9 @@ requires(detail::can_rest<Controller>()) class Resting {
   }
 
   void judge(const S& y, const Reference& reference) noexcept {
+    if constexpr (traits.varies_time) {
+      if (controller_.too_soon()) return;  // no sample: nothing changes
+    }
     if (!(error_ > S(0))) return leave();
     const bool same = stays(reference);
     r_ = reference(0);
@@ -211,7 +214,7 @@ requires(detail::can_rest<Controller>()) class Resting {
   S error_;
   S r_{};
   std::uint16_t samples_;
-  std::uint16_t inside_ = 0;  ///< samples in a row within the band, at most one more than it takes
+  std::uint32_t inside_ = 0;  ///< samples in a row within the band, at most one more than it takes
 };
 
 /// Distinguishes the type in snapshots.
