@@ -18,6 +18,7 @@
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/control/health.hpp>
+#include <esokit/control/resting.hpp>
 #include <esokit/core/snapshot.hpp>
 #include <esokit/model/linear_plant.hpp>
 #include <esokit/observer/linear_eso.hpp>
@@ -60,14 +61,12 @@ class Erased final : public AnyLoop {
  public:
   static Config config(double factor) {
     Config config{};
-    settings::fill(config);
-    config.start_hold = {};
-    config.missing = {};
-    if constexpr (requires { config.observer.leak_time; }) config.observer.leak_time = 0;
-    if constexpr (requires { config.observer.observer.leak_time; })
-      config.observer.observer.leak_time = 0;
-    if constexpr (requires { config.controller_bandwidth; }) config.controller_bandwidth *= factor;
-    chain_config<Observer>(config.observer).observer_bandwidth *= factor;
+    if constexpr (requires { config.rest; }) {
+      fill(config.controller, factor);
+      config.rest = {.error = 5e-4, .time = 0.25};
+    } else {
+      fill(config, factor);
+    }
     return config;
   }
   Erased()
@@ -82,8 +81,8 @@ class Erased final : public AnyLoop {
   }
   double update(double y, double r) override {
     // A compensator helps a controller of the user.
-    const double given = requires { controller_.gains(); }
-    ? r : 2.5 * (r - filled(y));
+    double given = r;
+    if constexpr (requires { controller_.compensation(); }) given = 2.5 * (r - filled(y));
     // A w that never settles, is lost now and then, and does nothing to the plant: once its gain
     // is zero again, d is what it was.
     if constexpr (requires { controller_.measured(1.0); }) {
@@ -141,6 +140,17 @@ class Erased final : public AnyLoop {
   [[nodiscard]] bool looked() const override { return monitor_.health().samples > 0; }
 
  private:
+  template <class Settings>
+  static void fill(Settings& config, double factor) {
+    settings::fill(config);
+    config.start_hold = {};
+    config.missing = {};
+    if constexpr (requires { config.observer.leak_time; }) config.observer.leak_time = 0;
+    if constexpr (requires { config.observer.observer.leak_time; })
+      config.observer.observer.leak_time = 0;
+    if constexpr (requires { config.controller_bandwidth; }) config.controller_bandwidth *= factor;
+    chain_config<Observer>(config.observer).observer_bandwidth *= factor;
+  }
   double filled(double y) {
     if (is_finite(y)) last_ = y;
     return last_;
@@ -282,6 +292,20 @@ TEST(Pairs, OfACompensator) {
   obeys_around<Known<Plain>>();
   obeys_around<WrappedOutput<Plain>>();
   obeys_around<Guarded<Plain>>();
+}
+
+template <class Observer>
+void obeys_at_rest() {
+  obeys<Observer, Resting<Adrc<Observer>>>();
+}
+
+TEST(Pairs, OfRest) {
+  obeys_at_rest<Delayed<Plain>>();
+  obeys_at_rest<OutlierGate<Plain>>();
+  obeys_at_rest<VariableTime<Plain>>();
+  obeys_at_rest<WrappedOutput<Plain>>();
+  obeys_at_rest<Guarded<Plain>>();
+  obeys_at_rest<Told<Plain>>();
 }
 
 TEST(Pairs, OfDelayedInput) {
