@@ -225,6 +225,17 @@ TEST(Resting, CountsGoodSamplesInARow) {
   EXPECT_EQ(c.mode(), LoopMode::rest);
 }
 
+/// Of a retune: what has passed counts for the new time.
+TEST(Resting, TakesAnotherTime) {
+  auto c = Axis<>::make(config(1, 0.25)).value();
+  for (int k = 0; k < 6; ++k) c.update(0, 0);
+  ASSERT_TRUE(c.retune(config(1, 8 * T)));
+  for (int k = 6; k < 8; ++k) c.update(0, 0);
+  EXPECT_EQ(c.mode(), LoopMode::running);
+  c.update(0, 0);
+  EXPECT_EQ(c.mode(), LoopMode::rest);
+}
+
 /// How far an axis gets that was at `speed` when it left the band: by a loop of omega_c = 20 rad/s,
 /// from an estimate that lags 3 / omega_o.
 double beyond(double speed) { return speed * (1 / (std::exp(1) * 20) + 3.0 / 150); }
