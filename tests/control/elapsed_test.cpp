@@ -289,6 +289,22 @@ TEST(Elapsed, APauseIsNoLeaveToJump) {
   EXPECT_TRUE(same_object(controller, before));
 }
 
+/// The rate limit counts from what was commanded, whatever the actuator reports before `elapsed`.
+TEST(Elapsed, CountsTheRateFromTheCommand) {
+  using C = Adrc<VariableTime<LinearEso<2>>>;
+  auto config = loop<double>();
+  config.limits = {.lower = -1e6, .upper = 1e6, .rate = 100};
+  for (const double samples : {1.0, 2.0, 10.0}) {
+    auto controller = C::make(config).value();
+    const double before = controller.update(0, 1e6);
+    controller.applied(-3);
+    ASSERT_TRUE(controller.elapsed(samples * T));
+    const double u = controller.update(0, 1e6);
+    EXPECT_NEAR(u - before, 100 * (samples < 4 ? samples * T : T), 1e-9);
+    EXPECT_EQ(controller.observer().applied_input(), -3);
+  }
+}
+
 TEST(Elapsed, GainsOfTheSampledDomainFollow) {
   using C = Adrc<VariableTime<LinearEso<2>>>;
   auto config = loop<double>();
