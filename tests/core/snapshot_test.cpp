@@ -1,5 +1,6 @@
 // Snapshots: every observer and the controllers come back bit for bit and go on alike; any changed
-// word, any two flipped bits and another type of the same size are refused; the text has the words.
+// word, any two flipped bits and another type of the same size are refused; the text has the words;
+// what lies between members is zero.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -7,6 +8,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
+#include <cstring>
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/measured.hpp>
 #include <esokit/adapter/variable_time.hpp>
@@ -14,6 +16,8 @@
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/control/predictive_adrc.hpp>
+#include <esokit/control/resting.hpp>
+#include <esokit/control/time_proportioned.hpp>
 #include <esokit/core/snapshot.hpp>
 #include <esokit/core/snapshot_text.hpp>
 #include <esokit/eigen.hpp>
@@ -28,9 +32,11 @@
 #include <esokit/observer/model_eso.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
 #include <esokit/observer/reduced_order_eso.hpp>
+#include <new>
 #include <string>
 #include <support/friction.hpp>
 #include <tuple>
+#include <type_traits>
 #include <vector>
 
 namespace core_snapshot_test {
@@ -220,6 +226,89 @@ TEST(Snapshot, AnotherTypeOfTheSameSizeIsRefused) {
   using Higher = LinearEso<1, float, 2>;
   static_assert(sizeof(Plain) == sizeof(Higher));
   EXPECT_FALSE(from_snapshot<Higher>(snapshot(*plain)));
+}
+
+/// Writes `byte` over the memory in which the next function keeps what it has not set.
+[[gnu::noinline]] void fill_stack(int byte) {
+  std::array<unsigned char, 40000> memory;
+  std::memset(memory.data(), byte, memory.size());
+  volatile unsigned char last = memory.back();
+  (void)last;
+}
+
+template <class T>
+[[gnu::noinline]] void make_at(void* memory, const typename T::Config& config) {
+  ::new (memory) T(T::make(config).value());
+}
+
+/// An object made in memory that was 0xaa and one in memory that was 0x55 have the same words.
+template <class T>
+void expect_words_without_rubbish(const typename T::Config& config) {
+  SCOPED_TRACE(testing::internal::GetTypeName<T>());
+  std::array<Snapshot<T>, 2> words{};
+  for (std::size_t i = 0; i < 2; ++i) {
+    alignas(T) std::array<unsigned char, sizeof(T)> memory;
+    const int byte = i == 0 ? 0xaa : 0x55;
+    std::memset(memory.data(), byte, memory.size());
+    fill_stack(byte);
+    make_at<T>(memory.data(), config);
+    words[i] = snapshot(*std::launder(reinterpret_cast<T*>(memory.data())));
+  }
+  EXPECT_EQ(words[0], words[1]);
+}
+
+template <class S>
+void expect_no_rubbish() {
+  const auto common = [](auto config) {
+    config.input_gain = S(3);
+    config.sample_time = S(1e-3);
+    if constexpr (requires { config.observer_bandwidth; }) config.observer_bandwidth = S(50);
+    if constexpr (requires { config.bandwidth_factor; }) config.bandwidth_factor = S(2);
+    if constexpr (requires { config.frequency_shift; }) config.frequency_shift = S(5);
+    if constexpr (requires { config.bandwidth_ratio; }) config.bandwidth_ratio = S(0.7);
+    return config;
+  };
+  const auto plain = [&]<class T>(std::type_identity<T>) {
+    expect_words_without_rubbish<T>(common(typename T::Config{}));
+  };
+  using Eso = LinearEso<2, S>;
+  plain(std::type_identity<Eso>{});
+  plain(std::type_identity<CascadeEso<2, 3, S>>{});
+  plain(std::type_identity<HalfGainEso<2, S>>{});
+  plain(std::type_identity<ReducedOrderEso<2, S>>{});
+  plain(std::type_identity<AlgebraicEso<2, S>>{});
+  plain(std::type_identity<AdjustableBandwidthEso<2, S>>{});
+  plain(std::type_identity<NonlinearEso<2, S>>{});
+  plain(std::type_identity<NonlinearEso<2, S, 1, FalGain<S>>>{});
+  plain(std::type_identity<ModelEso<ModelParts{.order = 1, .plant_poles = true}, S>>{});
+
+  using Filter = ExtendedStateFilter<2, S>;
+  auto filter = common(typename Filter::Config{});
+  filter.measurement_variance = S(1e-4);
+  filter.disturbance_bounds = {S(0), S(0), S(10)};
+  filter.inflation = S(0.5);
+  for (const RiccatiMode mode : {RiccatiMode::recursive, RiccatiMode::frozen}) {
+    filter.mode = mode;
+    expect_words_without_rubbish<Filter>(filter);
+  }
+
+  const auto eso = common(typename Eso::Config{});
+  expect_words_without_rubbish<DelayedInput<Eso, 3>>({.observer = eso, .delay = 2});
+  const typename Adrc<Eso>::Config adrc{.observer = eso, .controller_bandwidth = S(10)};
+  expect_words_without_rubbish<Adrc<Eso>>(adrc);
+  expect_words_without_rubbish<Adrc<Filter>>({.observer = filter, .controller_bandwidth = S(10)});
+  expect_words_without_rubbish<DisturbanceCompensator<Eso>>({.observer = eso});
+  expect_words_without_rubbish<PredictiveAdrc<Eso>>(
+      {.observer = eso, .controller_bandwidth = S(10)});
+  expect_words_without_rubbish<Resting<Adrc<Eso>>>({.controller = adrc});
+  expect_words_without_rubbish<TimeProportioned<S>>(
+      {.on = S(1), .window = S(1), .sample_time = S(0.1)});
+}
+
+// As the words of a frozen filter, pasted into firmware, that differed from run to run.
+TEST(Snapshot, BytesThatNobodyWritesAreZero) {
+  expect_no_rubbish<float>();
+  expect_no_rubbish<double>();
 }
 
 template <class... Types>

@@ -197,6 +197,7 @@ requires(detail::goes_into_a_loop<Observer>()) class Adapter
 
  protected:
   static constexpr int data_members = 1;  ///< of this base
+  using HoldsMembers = Adapter;           ///< the class that has them
 
   /// Stores a copy.
   explicit constexpr Adapter(const Observer& observer) noexcept : observer_(observer) {}

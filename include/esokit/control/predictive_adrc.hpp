@@ -485,6 +485,7 @@ requires(detail::foretells<Observer>()) class PredictiveAdrc {
 
   /// The next u, see `arm`.
   struct Next {
+    static constexpr int data_members = 8;
     S offset{};  ///< ubar_k; if the gain depends on e, the predicted y
     S slope{};   ///< minus du/dy
     S guard{};   ///< largest factor, with units, by which y enters the estimates
@@ -503,6 +504,7 @@ requires(detail::foretells<Observer>()) class PredictiveAdrc {
   Observer observer_;
   /// What a retune replaces.
   struct Set {
+    static constexpr int data_members = 8;
     AdrcLaw<order, S> law;
     Weights weights{};  ///< of the scaled states
     Weights feeds{};    ///< of the reference and its derivatives

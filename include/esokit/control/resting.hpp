@@ -167,6 +167,9 @@ requires(detail::can_rest<Controller>()) class Resting {
   /// @}
 
  private:
+  friend struct detail::LaneAccess;
+  static constexpr int data_members = 5;
+
   Resting(const Controller& controller, const S& error, const S& samples) noexcept
       : controller_(controller), error_(error), samples_(whole(samples)) {}
 

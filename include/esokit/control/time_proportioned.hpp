@@ -92,7 +92,9 @@ requires(detail::is_a_plain_scalar<S>()) class TimeProportioned {
   }
 
  private:
+  friend struct detail::LaneAccess;
   friend struct detail::RecordAccess;
+  static constexpr int data_members = 9;
 
   /// Of a sample: what rounding may be off by.
   static constexpr S part = S(1) / S(100);

@@ -147,6 +147,18 @@ struct LaneAccess {
   static constexpr bool has_members = counts<std::remove_const_t<Object>> ||
                                       (std::is_aggregate_v<Object> && std::is_class_v<Object> &&
                                        !requires(Object & object) { object[0]; });
+  /// Whether the class itself says that `with_members` finds all its data. Not an aggregate: one of
+  /// a user may hold what cannot be named, such as an array of C.
+  template <class Object>
+  static constexpr bool names_members = [] {
+    if constexpr (adds_rest<Object>) {
+      return true;
+    } else if constexpr (requires { typename Object::HoldsMembers; }) {
+      return sizeof(Object) == sizeof(typename Object::HoldsMembers);  // a base, and nothing more
+    } else {
+      return counts<Object>;
+    }
+  }();
   template <class Object>
   static constexpr bool steps = requires(Object& object) {
     object.advance();

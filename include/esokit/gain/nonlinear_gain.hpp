@@ -77,6 +77,8 @@ requires(detail::is_a_scalar<S>()) struct PowerSumGain {
 
   /// k with its exponents classified, see Power.
   struct Prepared {
+    static constexpr int data_members = 4;  ///< for snapshots
+
     S gain_alpha;    ///< K_alpha
     S gain_beta;     ///< K_beta
     Power<S> alpha;  ///< x^(alpha-1)
@@ -123,6 +125,8 @@ struct FalGain {
 
   /// k with its exponent classified, see Power.
   struct Prepared {
+    static constexpr int data_members = 2;  ///< for snapshots
+
     S gain;      ///< K
     Fal<S> fal;  ///< of unit gain
 
@@ -183,6 +187,7 @@ constexpr S least_magnitude() noexcept {
 /// k(|e| / scale) within its limits; common to the sampled and the continuous law.
 template <Scalar S, class Shape>
 struct LimitedGain {
+  static constexpr int data_members = 4;
   decltype(prepared(std::declval<const Shape&>())) function;
   S inverse_scale;
   S lower;

@@ -409,7 +409,8 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
     this->set_step(all);
   }
 
-  struct {
+  struct Rest {
+    static constexpr int data_members = 2;
     Settings settings;
     S speed{1};  ///< factor of the frequencies
   } rest_;

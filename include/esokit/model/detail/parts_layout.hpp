@@ -25,6 +25,8 @@ struct SpeedRange<true, S> {
 /// Settings of the parts of an AugmentedModel, in this order; members of absent parts are empty.
 template <ModelParts Parts, Scalar S>
 struct PartsSettings {
+  static constexpr int data_members = 6;  ///< for snapshots
+
   /// a_0 .. a_(n-1), unit of a_i: s^-(n-i); with ModelParts::states the LinearPlant: A, B, C and,
   /// for d, E.
   std::conditional_t<(Parts.states > 0), LinearPlant<(Parts.states > 0 ? Parts.states : 1), S>,
