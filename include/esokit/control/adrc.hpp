@@ -236,6 +236,10 @@ requires(detail::goes_into_a_loop<Observer>()) class Adrc {
   /// counts with the next one. A time that is negative or not finite is refused and changes
   /// nothing. The observer's gains, the rate limit (for one step, also after a pause) and, if
   /// placed in the sampled domain, the controller's gains follow.
+  ///
+  /// It belongs right before its `update`: another `elapsed`, `retune` or `adopt` in between
+  /// replaces it. If the scalar cannot hold the rate limit over it, it is refused and does not
+  /// count.
   template <class O = Observer>
   requires(observer_traits<O>.varies_time) Check<S> elapsed(const S& seconds)
   noexcept {
