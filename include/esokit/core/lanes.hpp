@@ -137,6 +137,7 @@ struct WithRest : Base {
 struct LaneAccess {
   template <class Object>
   static constexpr bool adds_rest = requires(Object& object) {
+    typename Object::Base;
     object.rest_;
   };
   template <class Object>

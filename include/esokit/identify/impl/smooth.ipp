@@ -203,7 +203,9 @@ inline Likelihood likelihood(const SampledLog& log, const SmoothModel& model, do
   std::size_t skip = log.measured > most ? (log.measured - most) / 2 : 0;
   std::size_t left = (std::min)(log.measured, most);
   std::size_t k = 0;
-  for (; skip > 0; ++k) skip -= is_finite(log.y[k]) ? 1 : 0;
+  for (; skip > 0; ++k) {
+    if (is_finite(log.y[k])) --skip;
+  }
   for (; left > 0; ++k) {
     if (is_finite(log.y[k])) {
       --left;
