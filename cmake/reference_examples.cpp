@@ -299,6 +299,16 @@ void approach_profile() {
   (void)motion;
 }
 
+void follow_profile() {
+  //! [FollowProfile]
+  auto profile = FollowProfile<2>::make({.limits = {2, 20}, .sample_time = 1e-3}).value();
+  auto controller = Adrc<LinearEso<2>>::make(adrc).value();
+  profile.start(read_y());
+  profile.update({read_r(), 0.5});  // once a sample: position and speed of what it follows
+  apply(controller.update(read_y(), profile.motion()));
+  //! [FollowProfile]
+}
+
 void resting() {
   //! [Resting]
   constexpr double count = 0.0015;  // of the encoder
@@ -433,6 +443,7 @@ int main() {
   tracking_differentiator();
   smooth_profile();
   approach_profile();
+  follow_profile();
   resting();
   time_proportioned();
   health_monitor();

@@ -11,7 +11,7 @@ set(esokit_units
     "analysis/dense analysis/error_bound analysis/integrator_chain"
     "control/absurd_numbers control/adrc control/controller_static control/missing_samples control/nonlinear_feedback control/pack control/softening"
     "control/adrc_law control/health control/pairs_law control/reconvergence control/time_proportioned control/tracking_differentiator"
-    "control/explicit_instantiation_static control/packed control/retune control/settings_law control/smooth_profile"
+    "control/explicit_instantiation_static control/follow_profile control/packed control/retune control/settings_law control/smooth_profile"
     "control/disturbance_compensator control/experiment control/mimo_adrc control/predictive_adrc"
     "control/linear_controller_laws control/varying_gain_controller_laws"
     "core/check core/expected core/lanes core/matrix core/pack core/scalar core/snapshot"

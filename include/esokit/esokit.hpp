@@ -48,6 +48,7 @@
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/control/experiment.hpp>
 #include <esokit/control/experiment_config.hpp>
+#include <esokit/control/follow_profile.hpp>
 #include <esokit/control/gain_probe.hpp>
 #include <esokit/control/health.hpp>
 #include <esokit/control/limiter.hpp>

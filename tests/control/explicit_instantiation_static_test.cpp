@@ -13,6 +13,7 @@
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/approach_profile.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
+#include <esokit/control/follow_profile.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/control/nonlinear_feedback.hpp>
 #include <esokit/control/predictive_adrc.hpp>
@@ -70,6 +71,8 @@ template class Adrc<ExtendedStateFilter<1>>;
 template class NonlinearFeedback<1>;
 template class TrackingDifferentiator<double>;
 template class ApproachProfile<2, 3>;
+template class FollowProfile<1>;
+template class FollowProfile<2>;
 template class SmoothProfile<1>;
 template class TimeProportioned<double>;
 template class Limiter<double>;

@@ -392,12 +392,12 @@ class Filler {
     MEMBER(half_gain, member = tape_.once_in(5, text))
     MEMBER(soften, tape_.once_in(3, text) ? static_cast<void>(member = tape_.once_in(2, text))
                                           : static_cast<void>(member))
-    if constexpr (requires { config.shortest_time; }) {
+    if constexpr (requires { S(config.limits[0]); }) {  // of a profile
       for (std::size_t i = 0; i < config.limits.size(); ++i) {
         const double fast = std::pow(T, -static_cast<double>(i + 1));
         number("limits", config.limits[i], {1e-3 * fast, fast, true});
       }
-      number("shortest_time", config.shortest_time, {0, 20 * T});
+      MEMBER(shortest_time, number(text, member, {0, 20 * T}))
     } else {
       MEMBER(limits, limits(member))
     }

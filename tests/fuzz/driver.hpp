@@ -1024,7 +1024,7 @@ class Driver final : public Game {
             d.fail("reset takes what is not finite, or refuses what is");
         });
       } else if constexpr (requires(T & o, S s) {
-                             o.feed();
+                             o.motion();
                              o.start(s, s);
                            }) {
         add(a, "start", [](Driver& d) {
@@ -1033,6 +1033,13 @@ class Driver final : public Game {
           if (d.accepted_ && !(is_finite(y) && is_finite(u)))
             d.fail("start takes what is not finite");
         });
+        if constexpr (requires(T & o) { o.wait(); }) {
+          add(a, "update at a speed", [](Driver& d) {
+            const S r = d.number(), speed = d.number();
+            (void)d.quietly([&] { return d.object_->update({r, speed}); });
+          });
+          add(a, "wait", [](Driver& d) { d.quietly([&] { d.object_->wait(); }); });
+        }
       }
     }
     if constexpr (requires(const T& o, const esokit::Vector<S, order_of<T>() + 1>& z,

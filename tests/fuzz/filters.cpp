@@ -4,6 +4,7 @@
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/approach_profile.hpp>
 #include <esokit/control/experiment.hpp>
+#include <esokit/control/follow_profile.hpp>
 #include <esokit/control/nonlinear_feedback.hpp>
 #include <esokit/control/smooth_profile.hpp>
 #include <esokit/control/time_proportioned.hpp>
@@ -27,6 +28,7 @@ void add_filters(std::vector<Kind>& kinds) {
   KIND(NonlinearFeedback<2, float>);
   KIND(SmoothProfile<2, float>);
   KIND(ApproachProfile<2, 3, float>);
+  KIND(FollowProfile<2, float>);
   KIND(TimeProportioned<float>);
 #ifndef ESOKIT_ONE_TYPE
   KIND(ExtendedStateFilter<2, double>);
@@ -37,6 +39,8 @@ void add_filters(std::vector<Kind>& kinds) {
   KIND(TrackingDifferentiator<double>);
   KIND(SmoothProfile<1, float>);
   KIND(ApproachProfile<1, 0, double>);
+  KIND(FollowProfile<1, float>);
+  KIND(FollowProfile<2, double>);
   KIND(SmoothProfile<4, float>);
   KIND(SmoothProfile<3, double>);
 #endif

@@ -45,8 +45,8 @@ requires(detail::goes_into_a_loop<Observer>()) struct AdrcConfig {
 /// actuator lags.
 ///
 /// Start: after `make` the controller is at y = 0, u = 0. `start(y, u)` takes over a plant at rest
-/// at y under u without a bump: with the reference at y, or a tracking differentiator reset to y,
-/// the first output is this u. During manual operation pass the operator's u to `track`, then
+/// at y under u without a bump: with the reference at y, or a profile that starts at y, the
+/// first output is this u. During manual operation pass the operator's u to `track`, then
 /// continue with `update`; u does not jump if the plant has come to rest (dhat = -b0 u) and the
 /// reference is at y. After both the rate limit counts from that u.
 ///

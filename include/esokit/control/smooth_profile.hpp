@@ -83,9 +83,8 @@ requires(detail::is_a_plain_scalar<S>()) struct SmoothProfileConfig {
 /// or (52.5 / 32)^(1/3) = 1.18 (n = 3) times as long as the fastest one with jumps of r^(n).
 ///
 /// A target that changes during a move is taken up at the end of the move: the profile does not
-/// stop or turn in between. A machine of order 1 has ApproachProfile, which takes any target at any
-/// time. For a reference that never rests use a TrackingDifferentiator, or give the law your own
-/// derivatives.
+/// stop or turn in between. FollowProfile takes any target at any time, and so does ApproachProfile
+/// for a machine of order 1.
 template <int Order, class S = double>
 requires(detail::is_a_plain_scalar<S>()) class SmoothProfile {
  public:
