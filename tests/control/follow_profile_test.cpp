@@ -99,7 +99,7 @@ TEST(FollowProfile, ArrivesAsFastAsTheOptimumAndDoesNotChatter) {
 template <class S>
 void searches(std::uint64_t seed) {
   Random random(seed);
-  const double digit = std::numeric_limits<S>::epsilon();
+  const double digit = static_cast<double>(std::numeric_limits<S>::epsilon());
   for (int i = 0; i < long_run(300); ++i) {
     const Case c = Case::random(random, 0.9);
     auto profile = begun<S>(c);
