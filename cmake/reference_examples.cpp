@@ -85,19 +85,6 @@ void extended_state_filter() {
   //! [ExtendedStateFilter]
 }
 
-void mimo_extended_state_filter() {
-  //! [MimoExtendedStateFilter]
-  using Filter = MimoExtendedStateFilter<ChainOrders<1, 2>, 2>;  // y_1' and y_2'', two inputs
-  Filter::Config config{.sample_time = 0.01,
-                        .disturbance_bounds = {0, 0.1, 0, 0, 0.1},
-                        .inflation_rule = InflationRule::none};
-  config.input_matrix = {{2, 0.5}, {-30, 100}};
-  config.measurement_covariance = {{1e-4, 0}, {0, 2e-4}};
-  auto filter = Filter::make(config).value();
-  filter.update({read_y(), read_y()}, {0.1, 0.2});
-  //! [MimoExtendedStateFilter]
-}
-
 void predictor_corrector() {
   //! [PredictorCorrector]
   struct Small {  // a gain law of your own
@@ -422,7 +409,6 @@ int main() {
   adjustable_bandwidth_eso();
   nonlinear_eso();
   extended_state_filter();
-  mimo_extended_state_filter();
   predictor_corrector();
   delayed_input();
   variable_time();

@@ -22,7 +22,6 @@
 #include <cmath>
 #include <cstdint>
 
-#include <esokit/analysis/error_bound.hpp>
 #include <esokit/analysis/peak_gain.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/sim/continuous_observer.hpp>
@@ -30,6 +29,7 @@
 #include <esokit/sim/runge_kutta.hpp>
 
 #include "analysis/analysis.hpp"
+#include "analysis/error_bound.hpp"
 
 using namespace esokit::examples;
 using namespace analysis;

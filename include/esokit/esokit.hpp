@@ -20,7 +20,6 @@
 #include <esokit/analysis/detail/loop_scan.hpp>
 #include <esokit/analysis/disturbance_alarm.hpp>
 #include <esokit/analysis/dynamic_matrix.hpp>
-#include <esokit/analysis/error_bound.hpp>
 #include <esokit/analysis/frequency_response.hpp>
 #include <esokit/analysis/health_text.hpp>
 #include <esokit/analysis/integrator_chain.hpp>
@@ -31,9 +30,7 @@
 #include <esokit/analysis/loop_noise.hpp>
 #include <esokit/analysis/loop_response.hpp>
 #include <esokit/analysis/lyapunov.hpp>
-#include <esokit/analysis/lyapunov_matrix.hpp>
 #include <esokit/analysis/margins.hpp>
-#include <esokit/analysis/measured_response.hpp>
 #include <esokit/analysis/observer_system.hpp>
 #include <esokit/analysis/peak_gain.hpp>
 #include <esokit/analysis/poles.hpp>
@@ -99,8 +96,6 @@
 #include <esokit/gain/gain_law.hpp>
 #include <esokit/gain/gating_certificate.hpp>
 #include <esokit/gain/half_gain.hpp>
-#include <esokit/gain/mimo_filter_config.hpp>
-#include <esokit/gain/mimo_riccati.hpp>
 #include <esokit/gain/model_gain.hpp>
 #include <esokit/gain/nonlinear_gain.hpp>
 #include <esokit/gain/nonlinear_gain_design.hpp>
@@ -161,7 +156,6 @@
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/half_gain_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
-#include <esokit/observer/mimo_extended_state_filter.hpp>
 #include <esokit/observer/model_eso.hpp>
 #include <esokit/observer/named_observer.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>

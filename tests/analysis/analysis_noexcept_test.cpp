@@ -5,12 +5,10 @@
 #include <cstdio>
 #include <esokit/analysis/covariance.hpp>
 #include <esokit/analysis/delay_margin.hpp>
-#include <esokit/analysis/error_bound.hpp>
 #include <esokit/analysis/frequency_response.hpp>
 #include <esokit/analysis/margins.hpp>
 #include <esokit/analysis/peak_gain.hpp>
 #include <esokit/observer/cascade_eso.hpp>
-#include <esokit/sim/continuous_observer.hpp>
 
 int main() {
   using namespace esokit;
@@ -19,8 +17,6 @@ int main() {
                                                 .input_gain = 1.0,
                                                 .sample_time = 1e-3})
                             .value();
-  const ContinuousCascadeEso<2, 2>::Config config{
-      .observer_bandwidth = 30.0, .bandwidth_factor = 2.0, .input_gain = 1.0};
 
   const esokit_test::NoAllocation guard;
   bool fine = true;
@@ -35,11 +31,6 @@ int main() {
   const auto grid = log_grid<50>(1.0, 3000.0).value();
   require((bode<0, 2>(observer_system(observer), grid)).has_value(), "bode");
   require(peak_gain(error_system(observer)).has_value(), "peak gain");
-  require(cascade_error_bounds<2>(config, {.disturbance_rate = 1.0}).has_value(), "cascade bound");
-  require(switched_error_bound<3>({10.0, 0.7}, {.disturbance_rate = 1.0}).has_value(),
-          "switched bound");
-  require(!switched_error_bound<3>({10.0, 0.2}, {.disturbance_rate = 1.0}).has_value(),
-          "refused bound");
   require(guard.count() == 0, "no allocation");
 
   const auto controller = Adrc<CascadeEso<2, 2>>::make({.observer = {.observer_bandwidth = 30.0,

@@ -7,7 +7,6 @@
 #include <esokit/analysis/detail/eigenvalues.hpp>
 #include <esokit/analysis/linear_system.hpp>
 #include <esokit/analysis/lyapunov.hpp>
-#include <esokit/analysis/lyapunov_matrix.hpp>
 #include <esokit/analysis/poles.hpp>
 #include <support/refusal.hpp>
 #include <vector>
@@ -109,23 +108,6 @@ TEST(Dense, StabilityOfSlowSampledPolesKeepsItsDigits) {
   EXPECT_NEAR(stability_abscissa(system), 1e-12, 1e-15);
   system.a(0, 0) = -2.5;
   EXPECT_NEAR(spectral_radius(system), 1.5, 1e-14);
-}
-
-TEST(Dense, SymmetricEigenvalues) {
-  Random random(4);
-  for (int trial = 0; trial < 100; ++trial) {
-    const auto half = random_matrix<5>(random);
-    const EigenMatrix<double, 5, 5> a = half + half.transpose();
-    EigenMatrix<double, 5, 5> values = a;
-    EigenMatrix<double, 5, 5> v;
-    detail::symmetric_eigenvalues({values.data(), 5}, {v.data(), 5});
-    EXPECT_LT((v.transpose() * v - EigenMatrix<double, 5, 5>::Identity()).cwiseAbs().maxCoeff(),
-              1e-13);
-    for (int i = 0; i < 5; ++i) {
-      const EigenMatrix<double, 5> residual = a * v.col(i) - values(i, i) * v.col(i);
-      EXPECT_LT(residual.cwiseAbs().maxCoeff(), 1e-13);
-    }
-  }
 }
 
 TEST(Balance, ChangesNoTransferFunction) {

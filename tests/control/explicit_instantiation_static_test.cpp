@@ -25,7 +25,6 @@
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/linear_eso.hpp>
-#include <esokit/observer/mimo_extended_state_filter.hpp>
 #include <esokit/observer/model_eso.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
 #include <support/friction.hpp>
@@ -57,7 +56,6 @@ template class MimoAdrc<LinearEso<1>, LinearEso<1>>;
 template class Guarded<LinearEso<1>>;
 template class Guarded<ModelEso<ModelParts{.order = 1, .actuator = 1}>>;
 template class ExtendedStateFilter<1>;
-template class MimoExtendedStateFilter<ChainOrders<1>, 1>;
 template class AlgebraicEso<1>;
 template class CascadeEso<1, 2>;
 template class AdjustableBandwidthEso<1>;

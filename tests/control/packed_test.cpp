@@ -23,7 +23,6 @@
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
-#include <esokit/observer/mimo_extended_state_filter.hpp>
 #include <esokit/observer/model_eso.hpp>
 #include <support/friction.hpp>
 #include <support/lanes.hpp>
@@ -222,21 +221,6 @@ struct TwoChannels {
     config.controller_bandwidths = {set(lane, again, 4), set(lane, again, 5)};
     config.input_matrix = {{set(lane, again, 2), 0.25}, {0.5, set(lane, again, -1)}};
     for (auto& limits : config.limits) limits = {-4.0, set(lane, again, 5), 1e3};
-    return config;
-  }
-};
-
-/// One chain of two inputs: what goes lane by lane are the vectors and matrices of its members.
-struct TwoInputs {
-  using Type = esokit::MimoExtendedStateFilter<esokit::ChainOrders<1>, 2>;
-  static Type::Config config(int lane, bool again) {
-    Type::Config config{};
-    config.input_matrix = {{set(lane, again, 2), 0.25}};
-    config.sample_time = set(lane, false, 0.01);
-    config.measurement_covariance(0, 0) = set(lane, again, 0.01);
-    for (auto& bound : config.disturbance_bounds) bound = set(lane, again, 0.1);
-    config.inflation = set(lane, again, 0.05);
-    config.max_gap = 4;
     return config;
   }
 };
@@ -469,19 +453,6 @@ TEST(Packed, MimoAdrc) {
       [](const auto& c) {
         return Answers(c.output(), c.status(0), c.status(1), c.template observer<0>().estimate(),
                        c.template observer<1>().estimate());
-      });
-}
-
-TEST(Packed, MimoExtendedStateFilter) {
-  expect_lanes<TwoInputs>(
-      [](auto& f, const auto& x, int k) {
-        using T = std::remove_cvref_t<decltype(x[0])>;
-        if (k % 113 == 50) (void)f.reset(Vector<T, 1>{x[0]});
-        return Answers(f.update(Vector<T, 1>{x[0]}, Vector<T, 2>{x[1], x[3]}));
-      },
-      [](const auto& f) {
-        return Answers(f.estimate(), f.template chain_estimate<0>(), f.total_disturbance(),
-                       f.missed(0), f.innovation(), f.normalised_innovation());
       });
 }
 

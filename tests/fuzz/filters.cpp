@@ -10,7 +10,6 @@
 #include <esokit/control/time_proportioned.hpp>
 #include <esokit/control/tracking_differentiator.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
-#include <esokit/observer/mimo_extended_state_filter.hpp>
 
 #include "fuzz/driver.hpp"
 #include "fuzz/kinds.hpp"
@@ -22,7 +21,6 @@ using namespace esokit;
 void add_filters(std::vector<Kind>& kinds) {
   KIND(ExtendedStateFilter<1, float>);
   KIND(ExtendedStateFilter<1, float, 1, NoNominalModel, 8>);
-  KIND(MimoExtendedStateFilter<ChainOrders<1, 2>, 2, float>);
   KIND(Experiment<2, float>);
   KIND(TrackingDifferentiator<float>);
   KIND(NonlinearFeedback<2, float>);
@@ -34,7 +32,6 @@ void add_filters(std::vector<Kind>& kinds) {
   KIND(ExtendedStateFilter<2, double>);
   KIND(WrappedOutput<ExtendedStateFilter<2, float>>);
   KIND(VariableTime<DelayedInput<ExtendedStateFilter<2, double>, 2>>);
-  KIND(MimoExtendedStateFilter<ChainOrders<2, 2>, 1, double>);
   KIND(Experiment<1, double>);
   KIND(TrackingDifferentiator<double>);
   KIND(SmoothProfile<1, float>);

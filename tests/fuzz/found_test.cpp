@@ -7,7 +7,6 @@
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/analysis/covariance.hpp>
 #include <esokit/analysis/delay_margin.hpp>
-#include <esokit/analysis/error_bound.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/control/smooth_profile.hpp>
 #include <esokit/eigen.hpp>
@@ -258,27 +257,6 @@ TEST(Found, MarginsOfAPlantWithNextToNoGainAreNumbers) {
     EXPECT_NEAR(found->modulus.value, 1.0, 1e-9) << b;
     EXPECT_FALSE(std::isnan(found->phase.value) || std::isnan(found->gain_increase.value)) << b;
   }
-}
-
-TEST(Found, ErrorBoundsAreNumbers) {
-  const auto bound =
-      esokit::linear_error_bound<3>({.observer_bandwidth = 2, .input_gain = 1}, {5, 1e-3}).value();
-  EXPECT_TRUE(bound.convergence_time({1, 2, 3}));
-  EXPECT_EQ(refusal(bound.convergence_time({1, 2, HUGE_VAL})), "initial[2]: must be finite");
-  EXPECT_EQ(refusal(bound.convergence_time({1, largest<double>, 3})),
-            "initial: leaves the range of the scalar in the scaling of the bound");
-  const std::string rule =
-      "observer_bandwidth: gives with these sources a bound that the scalar cannot hold";
-  EXPECT_EQ(refusal(esokit::linear_error_bound<3>({.observer_bandwidth = 2e-209, .input_gain = 1},
-                                                  {0, 1e-3})),
-            rule);
-  EXPECT_EQ(refusal(esokit::linear_error_bound<3>({.observer_bandwidth = 2, .input_gain = 1},
-                                                  {5, largest<double>})),
-            rule);
-  EXPECT_EQ(refusal(esokit::switched_error_bound<3>({1e306, 0.7, 1}, {5, 1e-3})), rule);
-  EXPECT_EQ(refusal(esokit::cascade_error_bounds<2, 3, 2>(
-                {.observer_bandwidth = 1e120, .bandwidth_factor = 2, .input_gain = 1}, {5, 1e-3})),
-            rule);
 }
 
 /// way / limit was 0 in float, so a move took one sample, and its fourth derivative was infinite.

@@ -7,7 +7,6 @@
 #include <esokit/analysis/covariance.hpp>
 #include <esokit/analysis/delay_margin.hpp>
 #include <esokit/analysis/disturbance_alarm.hpp>
-#include <esokit/analysis/error_bound.hpp>
 #include <esokit/analysis/frequency_response.hpp>
 #include <esokit/analysis/health_text.hpp>
 #include <esokit/analysis/loop.hpp>
@@ -256,49 +255,6 @@ Failure loop_study(Episode& episode) {
   if (!observer || !law || !plant) return study.done();
   const auto loop = closed_loop(*plant, ObserverWithLaw{*observer, *law});
   if (const auto closed = study.answer("closed_loop", loop)) ask_loop(study, *closed);
-  return study.done();
-}
-
-template <int Size>
-void ask_bound(Study& study, const ErrorBound<Size>& bound) {
-  study.finite("gamma, level, rate", std::array{bound.gamma, bound.level, bound.rate});
-  study.finite("ultimate", bound.ultimate());
-  EigenMatrix<double, Size> initial;
-  for (double& x : initial) x = study.number<double>("initial", signal);
-  const double t = study.number<double>("t", {0, 10});
-  const double excess = study.number<double>("excess", {0.01, 1});
-  const auto at = bound.at(t, initial);
-  if (study.plain()) study.finite("at", at);
-  if (const auto time = study.answer("convergence_time", bound.convergence_time(initial, excess))) {
-    study.finite("convergence_time", *time);
-  }
-}
-
-Failure bound_study(Episode& episode) {
-  Study study(episode);
-  const ErrorSources sources{study.number<double>("disturbance_rate", {0, 10}),
-                             study.number<double>("measurement_noise", {0, 1e-2})};
-  const double w = study.number<double>("observer_bandwidth", rate);
-  const double factor = study.number<double>("factor", {1.2, 3});
-  const double least = study.number<double>("least", {0.4, 1});
-  const double greatest = study.number<double>("greatest", {1, 2});
-  if (const auto b = study.answer(
-          "linear", linear_error_bound<3>({.observer_bandwidth = w, .input_gain = 1.0}, sources))) {
-    ask_bound(study, *b);
-  }
-  const ContinuousCascadeEsoConfig<3, 2, double, EqualPoles> cascade{
-      .observer_bandwidth = w, .bandwidth_factor = factor, .input_gain = 1.0};
-  if (const auto b = study.answer("cascade", cascade_error_bounds<2, 3, 2>(cascade, sources))) {
-    for (const auto& level : *b) ask_bound(study, level);
-  }
-  if (const auto b =
-          study.answer("switched", switched_error_bound<3>({w, least, greatest}, sources))) {
-    ask_bound(study, *b);
-  }
-  if (const auto b =
-          study.answer("nonlinear", nonlinear_error_bound<4>({w, least, greatest}, sources))) {
-    ask_bound(study, *b);
-  }
   return study.done();
 }
 
@@ -622,7 +578,6 @@ void add_studies(std::vector<Kind>& kinds) {
   kinds.push_back({"loop of LinearEso<2>", &loop_study<LinearEso<2>>, 5});
   kinds.push_back({"loop of CascadeEso<1, 2, float>", &loop_study<CascadeEso<1, 2, float>>, 5});
   kinds.push_back({"loop of ContinuousLinearEso<2>", &loop_study<ContinuousLinearEso<2>>, 5});
-  kinds.push_back({"error bounds", &bound_study, 5});
   kinds.push_back(
       {"ContinuousCascadeEso<2, 2>", &continuous_study<ContinuousCascadeEso<2, 2, double>>});
   kinds.push_back(

@@ -14,7 +14,6 @@
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/half_gain_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
-#include <esokit/observer/mimo_extended_state_filter.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
 #include <esokit/observer/reduced_order_eso.hpp>
 #include <support/friction.hpp>
@@ -104,22 +103,6 @@ void laws_give_back() {
         {.gains = {S(1), S(1)}, .linear_widths = {S(0.1), S(0.1)}, .input_gain = b0});
     ASSERT_TRUE(nonlinear.has_value()) << nonlinear;
     ASSERT_EQ(nonlinear->input_gain(), b0);
-  }
-}
-
-TEST(OtherGivenValues, OfTheFilterOfSeveralOutputs) {
-  using Filter = esokit::MimoExtendedStateFilter<esokit::ChainOrders<1, 1>, 2, float>;
-  Random random(17);
-  for (int i = 0; i < 300; ++i) {
-    Filter::Config config;
-    config.sample_time = static_cast<float>(random.log_uniform(1e-5, 1e-1));
-    eigen(config.input_matrix).setIdentity();
-    eigen(config.measurement_covariance).setIdentity();
-    config.inflation = 1.0f;
-    config.disturbance_bounds.fill(0.1f);
-    const auto filter = Filter::make(config);
-    ASSERT_TRUE(filter.has_value()) << filter;
-    ASSERT_EQ(filter->sample_time(), config.sample_time);
   }
 }
 

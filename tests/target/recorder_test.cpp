@@ -25,7 +25,6 @@
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/half_gain_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
-#include <esokit/observer/mimo_extended_state_filter.hpp>
 #include <esokit/observer/model_eso.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
 #include <esokit/observer/reduced_order_eso.hpp>
@@ -465,7 +464,6 @@ TEST(NotRecorded, WhatRunsLaneByLane) {
                {can_be_recorded<Adrc<DelayedInput<Plain, 4>>>, "its observer"},
                {can_be_recorded<DisturbanceCompensator<OutlierGate<Plain>>>, "its observer"},
                {can_be_recorded<MimoAdrc<Plain, Plain>>, "several channels, lane by lane"},
-               {can_be_recorded<MimoExtendedStateFilter<ChainOrders<1>, 2>>, "lane by lane"},
                {can_be_recorded<TrackingDifferentiator<>>, "branches, lane by lane"}};
   for (const auto& type : types) {
     EXPECT_FALSE(type.recorded) << type.reason << ": now it can be, so add it to the law above";

@@ -14,7 +14,6 @@
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/half_gain_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
-#include <esokit/observer/mimo_extended_state_filter.hpp>
 #include <esokit/observer/model_eso.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
 #include <esokit/observer/reduced_order_eso.hpp>
@@ -37,7 +36,6 @@ template class LinearEso<3, float, 2>;
 // Not LinearEso by a PoleSet, whose make computes the longest gap in double: once, where it is
 // designed.
 template class NonlinearEso<2, float, 1, FalGain<float>>;
-template class MimoExtendedStateFilter<ChainOrders<2, 1>, 2, float>;
 
 template class Adrc<Observer, ErrorBased>;
 template class Adrc<HalfGainEso<2, float>>;

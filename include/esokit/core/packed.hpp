@@ -137,9 +137,8 @@ struct PackedTraits<Form> {
 /// `DelayedInput`, `Adrc` and `DisturbanceCompensator` of all these, laws, limiter and plants. If a
 /// lane has a bad sample or a gap, a start hold or a measurement divider, or if lanes differ in the
 /// delay, the lanes of this step go one by one. All other types go lane by lane: the other
-/// adapters, a `ModelEso` that follows a speed, `PredictiveAdrc`, `MimoAdrc`,
-/// `MimoExtendedStateFilter`, the differentiators, your own. A pack of them costs as much as its
-/// lanes together.
+/// adapters, a `ModelEso` that follows a speed, `PredictiveAdrc`, `MimoAdrc`, the differentiators,
+/// your own. A pack of them costs as much as its lanes together.
 ///
 /// What T has besides the members below is called through `each`, of one lane through a copy of it,
 /// `packed[i]`.

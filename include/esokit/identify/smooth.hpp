@@ -5,7 +5,6 @@
 
 #include <cstddef>
 #include <esokit/adapter/delayed_input.hpp>
-#include <esokit/analysis/measured_response.hpp>
 #include <esokit/analysis/observer_system.hpp>
 #include <esokit/core/detail/compiled.hpp>
 #include <esokit/identify/log.hpp>
@@ -54,6 +53,31 @@ struct SmoothModel {
   int integrations = 0;  ///< from what walks to y
   double sample_time = 0.0;
 };
+
+/// The states of the observer's linear form that shift_load(1) adds, states x 1.
+/// @param observer without adapters @param states of the form, which may begin with these
+template <class Observer>
+DynamicMatrix<double> load_column(const Observer& observer, int states) {
+  using Model = std::remove_cvref_t<decltype(observer.model())>;
+  DynamicMatrix<double> column(states, 1);
+  if constexpr (model_traits<Model>.is_chain) {
+    // Each level of the form has the sum of what it and those before it found.
+    for (int level = 0; level < Observer::levels; ++level) {
+      column(level * Observer::size + Observer::order, 0) = 1.0;
+    }
+  } else {
+    const auto units = sampled_matrices(observer).units;
+    const auto of_model = observer.model().constant_column();
+    const double scaled =
+        static_cast<double>(observer.model().scaled_constant(typename Observer::scalar_type(1)));
+    for (int i = 0; i < Observer::size * Observer::levels; ++i) {
+      const int row = i % Observer::size;
+      column(i, 0) =
+          static_cast<double>(of_model[static_cast<std::size_t>(row)]) * units(row) * scaled;
+    }
+  }
+  return column;
+}
 
 template <SampledLinearObserver Observer>
 SmoothModel smooth_model(const Observer& observer) {

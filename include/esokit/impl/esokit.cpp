@@ -16,7 +16,6 @@
 #include <esokit/analysis/impl/loop_response.ipp>
 #include <esokit/analysis/impl/loop_scan.ipp>
 #include <esokit/analysis/impl/lyapunov.ipp>
-#include <esokit/analysis/impl/lyapunov_matrix.ipp>
 #include <esokit/analysis/impl/margins.ipp>
 #include <esokit/analysis/impl/observer_system.ipp>
 #include <esokit/analysis/impl/peak_gain.ipp>

@@ -60,11 +60,11 @@ class FilterDesign {
     const S& r = config.measurement_variance;
     Rules<S> rules;
     rules.not_negative("measurement_variance", r)
-        .all_of(check_covariance("initial_covariance", config.initial_covariance, true));
+        .all_of(check_covariance("initial_covariance", config.initial_covariance));
     Covariance q = Covariance::Zero();
     if (config.process_covariance) {
       q = *config.process_covariance;
-      rules.all_of(check_covariance("process_covariance", q, true));
+      rules.all_of(check_covariance("process_covariance", q));
     }
     // With a model of the disturbance the unmodelled change is the difference of two changes, each
     // within the bound: it can be twice the bound.

@@ -1,6 +1,5 @@
 /// @file
-/// The noise settings of the filters, checked and factored: common to ExtendedStateFilter and
-/// MimoExtendedStateFilter.
+/// The noise settings of ExtendedStateFilter, checked and factored.
 #pragma once
 
 #include <esokit/core/check.hpp>
@@ -32,14 +31,14 @@ const char* noise_field(const Config& config) noexcept {
   return config.process_covariance ? "process_covariance" : "disturbance_bounds";
 }
 
-/// Finite and symmetric. @param variances true: a negative variance is refused here, too
+/// Finite, symmetric and without a negative variance.
 template <int N, Scalar S>
-Check<S> check_covariance(const char* field, const Matrix<S, N, N>& p, bool variances) {
+Check<S> check_covariance(const char* field, const Matrix<S, N, N>& p) {
   Rules<S> rules;
   for (int i = 0; i < N; ++i) {
     for (int j = 0; j < N; ++j) rules.finite(field, p(i, j), i * N + j);
-    rules.demand(!variances || all(p(i, i) >= S(0.0)), field, p(i, i),
-                 "must be positive semidefinite", i * N + i);
+    rules.demand(all(p(i, i) >= S(0.0)), field, p(i, i), "must be positive semidefinite",
+                 i * N + i);
   }
   for (int i = 0; i < N; ++i) {
     for (int j = 0; j < i; ++j) {

@@ -2,17 +2,17 @@
 // input of a run is the worst there is for a linear observer: the sign of the impulse response,
 // backwards. Printed: how loose a bound is.
 #include <gtest/gtest.h>
-#include <esokit/sim/continuous_observer.hpp>
 
 #include <algorithm>
+#include <analysis/error_bound.hpp>
 #include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdio>
-#include <esokit/analysis/error_bound.hpp>
 #include <esokit/analysis/observer_system.hpp>
 #include <esokit/analysis/peak_gain.hpp>
 #include <esokit/eigen.hpp>
+#include <esokit/sim/continuous_observer.hpp>
 #include <esokit/sim/runge_kutta.hpp>
 #include <limits>
 #include <numbers>
@@ -22,9 +22,9 @@
 
 #include "support/numbers.hpp"
 
-namespace analysis_error_bound_test {
+namespace examples_error_bound_test {
 
-using namespace esokit;
+using namespace analysis;
 using esokit_test::Random;
 using esokit_test::refusal;
 
@@ -384,8 +384,8 @@ void expect_inequality(const EigenMatrix<double, N, N>& a, const LyapunovMatrix<
 }
 
 TEST(LyapunovMatrix, SatisfiesItsInequalities) {
-  const auto slow = detail::scaled_error_matrix<3>(detail::binomial_gain<3>(0.5));
-  const auto fast = detail::scaled_error_matrix<3>(detail::binomial_gain<3>());
+  const auto slow = scaled_error_matrix<3>(binomial_gain<3>(0.5));
+  const auto fast = scaled_error_matrix<3>(binomial_gain<3>());
   const auto both = common_lyapunov_matrix<3>(std::array{slow, fast}).value();
   expect_inequality<3>(slow, both);
   expect_inequality<3>(fast, both);
@@ -399,54 +399,6 @@ TEST(LyapunovMatrix, SatisfiesItsInequalities) {
   EXPECT_LT(best.gamma() * best.largest, 1.001 * one.gamma() * one.largest);
   EXPECT_EQ(refusal(lyapunov_matrix<3>(-fast)),
             "system: is not stable: the stationary covariance does not exist");
-}
-
-TEST(PeakGain, OfAnOscillatorIsKnown) {
-  for (const double zeta : {0.1, 0.5}) {
-    LinearSystem<2, 1, 1> system;
-    system.a << 0.0, 1.0, -25.0, -10.0 * zeta;
-    system.b << 0.0, 25.0;
-    system.c << 1.0, 0.0;
-    const double root = std::sqrt(1.0 - zeta * zeta);
-    const double exact = 1.0 / std::tanh(0.5 * std::numbers::pi * zeta / root);
-    EXPECT_NEAR(peak_gain(system).value()(0, 0), exact, 2e-4 * exact);
-  }
-  LinearSystem<1, 1, 1> sampled;
-  sampled.sample_time = 1.0;
-  sampled.a(0, 0) = -1.8;  // A = -0.8
-  sampled.b(0, 0) = 2.0;
-  sampled.c(0, 0) = 1.0;
-  sampled.d(0, 0) = -3.0;
-  EXPECT_NEAR(peak_gain(sampled).value()(0, 0), 3.0 + 2.0 / 0.2, 1e-7);
-  sampled.a(0, 0) = 0.0;
-  EXPECT_EQ(refusal(peak_gain(sampled)), "stability_abscissa: must be negative: it is not stable");
-}
-
-TEST(PeakGain, OfASampledObserverIsTheSumOfItsImpulseResponse) {
-  auto observer = CascadeEso<2, 2>::make({.observer_bandwidth = 20.0,
-                                          .bandwidth_factor = 2.0,
-                                          .input_gain = 1.0,
-                                          .sample_time = 0.01})
-                      .value();
-  const auto peak = peak_gain(error_system(observer)).value();
-  EigenMatrix<double, 3> sum = EigenMatrix<double, 3>::Zero();
-  for (int k = 0; k < 2000; ++k) {
-    observer.update(k == 0 ? 1.0 : 0.0, 0.0);
-    sum += eigen(observer.estimate()).cwiseAbs();
-  }
-  for (int r = 0; r < 3; ++r) EXPECT_NEAR(peak(r, 0), sum(r), 1e-7 * sum(r));
-  // w = d' of one, held over a sample: from then on d is a constant.
-  const double T = observer.sample_time();
-  ASSERT_EQ(observer.reset(EigenMatrix<double, 3>(0.0, 0.0, 0.0)), StepStatus::ok);
-  EigenMatrix<double, 3> truth(T * T * T / 6.0, T * T / 2.0, T);
-  sum.setZero();
-  for (int k = 0; k < 2000; ++k) {
-    observer.update(truth(0), 0.0);
-    sum += eigen((truth - observer.estimate())).cwiseAbs();
-    truth(0) += T * (truth(1) + 0.5 * T * truth(2));
-    truth(1) += T * truth(2);
-  }
-  for (int r = 0; r < 3; ++r) EXPECT_NEAR(peak(r, 1), sum(r), 1e-7 * sum(r));
 }
 
 TEST(ErrorBound, RefusesBadSettings) {
@@ -490,4 +442,25 @@ TEST(ErrorBound, RefusesBadSettings) {
   EXPECT_EQ(some.convergence_time(EigenMatrix<double, 3>::Zero()).value(), 0.0);
 }
 
-}  // namespace analysis_error_bound_test
+TEST(ErrorBound, IsANumberOrRefused) {
+  const auto bound =
+      linear_error_bound<3>({.observer_bandwidth = 2, .input_gain = 1}, {5, 1e-3}).value();
+  EXPECT_TRUE(bound.convergence_time({1, 2, 3}));
+  EXPECT_EQ(refusal(bound.convergence_time({1, 2, HUGE_VAL})), "initial[2]: must be finite");
+  EXPECT_EQ(refusal(bound.convergence_time({1, std::numeric_limits<double>::max(), 3})),
+            "initial: leaves the range of the scalar in the scaling of the bound");
+  const std::string rule =
+      "observer_bandwidth: gives with these sources a bound that the scalar cannot hold";
+  EXPECT_EQ(
+      refusal(linear_error_bound<3>({.observer_bandwidth = 2e-209, .input_gain = 1}, {0, 1e-3})),
+      rule);
+  EXPECT_EQ(refusal(linear_error_bound<3>({.observer_bandwidth = 2, .input_gain = 1},
+                                          {5, std::numeric_limits<double>::max()})),
+            rule);
+  EXPECT_EQ(refusal(switched_error_bound<3>({1e306, 0.7, 1}, {5, 1e-3})), rule);
+  EXPECT_EQ(refusal(cascade_error_bounds<2, 3, 2>(
+                {.observer_bandwidth = 1e120, .bandwidth_factor = 2, .input_gain = 1}, {5, 1e-3})),
+            rule);
+}
+
+}  // namespace examples_error_bound_test

@@ -3,13 +3,18 @@
 /// error bounds.
 #pragma once
 
+#include <Eigen/Eigenvalues>
+#include <array>
 #include <cmath>
-#include <esokit/analysis/lyapunov.hpp>
-#include <esokit/core/detail/compiled.hpp>
-#include <esokit/math/detail/dense.hpp>
+#include <cstddef>
 #include <limits>
 
-namespace esokit {
+#include <esokit/analysis/lyapunov.hpp>
+#include <esokit/eigen.hpp>
+
+namespace analysis {
+
+using namespace esokit;
 
 /// P with A'P + P A <= -I, and its extreme eigenvalues.
 template <int Size>
@@ -22,12 +27,6 @@ struct LyapunovMatrix {
   [[nodiscard]] double gamma() const { return std::sqrt(largest / smallest); }
 };
 
-namespace detail {
-
-/// Computes the eigenvalues of a symmetric a by Jacobi rotations: a becomes diagonal with the
-/// eigenvalues, the columns of v become the eigenvectors.
-void symmetric_eigenvalues(DenseView<double> a, DenseView<double> v) noexcept;
-
 /// Extreme eigenvalues of a symmetric matrix, and their eigenvectors.
 template <int Size>
 struct Extremes {
@@ -36,21 +35,10 @@ struct Extremes {
 };
 
 template <int Size>
-Extremes<Size> extremes(EigenMatrix<double, Size, Size> a) {
-  EigenMatrix<double, Size, Size> v;
-  symmetric_eigenvalues({a.data(), Size}, {v.data(), Size});
-  int low = 0;
-  int high = 0;
-  for (int i = 1; i < Size; ++i) {
-    if (a(i, i) < a(low, low)) low = i;
-    if (a(i, i) > a(high, high)) high = i;
-  }
-  Extremes<Size> result{a(low, low), a(high, high), {}, {}};
-  for (int i = 0; i < Size; ++i) {
-    result.at_smallest(i) = v(i, low);
-    result.at_largest(i) = v(i, high);
-  }
-  return result;
+Extremes<Size> extremes(const EigenMatrix<double, Size, Size>& a) {
+  const Eigen::SelfAdjointEigenSolver<EigenMatrix<double, Size, Size>> of(a);
+  return {of.eigenvalues()(0), of.eigenvalues()(Size - 1), of.eigenvectors().col(0),
+          of.eigenvectors().col(Size - 1)};
 }
 
 template <int Size>
@@ -129,8 +117,6 @@ struct Ellipsoid {
   }
 };
 
-}  // namespace detail
-
 /// P with A'P + P A = -I.
 /// @param a A, N x N, 1/s
 /// @return error if A is not stable
@@ -141,7 +127,7 @@ Expected<LyapunovMatrix<Size>, Error<double>> lyapunov_matrix(
   const EigenMatrix<double, Size, Size> identity = EigenMatrix<double, Size, Size>::Identity();
   const auto p = solve_lyapunov<Size>(transposed, identity, false);
   if (!p) return p.error();
-  return detail::with_eigenvalues<Size>(*p);
+  return with_eigenvalues<Size>(*p);
 }
 
 /// One P with A_i'P + P A_i <= -I for all given A_i, and therefore for every convex combination of
@@ -158,19 +144,19 @@ template <int Size, std::size_t Modes>
 Expected<LyapunovMatrix<Size>, Error<double>> common_lyapunov_matrix(
     const std::array<EigenMatrix<double, Size, Size>, Modes>& a, double most = 1e5) {
   static_assert(Size >= 2, "esokit: at least two states");
-  constexpr int count = detail::triangle<Size>;
+  constexpr int count = triangle<Size>;
   using Square = EigenMatrix<double, Size, Size>;
   Rules<double> rules;
   for (const Square& mode : a) {
     rules.finite("system", detail::sum_of_magnitudes(mode.data(), Size * Size));
   }
   if (!rules) return rules.error();
-  detail::Ellipsoid<count> ellipsoid(most * std::sqrt(double(count)));
+  Ellipsoid<count> ellipsoid(most * std::sqrt(double(count)));
   double best = std::numeric_limits<double>::infinity();
   double violation = 0.0;
   Square best_p = Square::Zero();
   for (int step = 0; step < 100 * count * count; ++step) {
-    const Square p = detail::from_triangle<Size>(ellipsoid.center);
+    const Square p = from_triangle<Size>(ellipsoid.center);
     // d/dP of left' P right + right' P left
     Array<double, count> gradient{};
     const auto add = [&](const EigenMatrix<double, Size>& left,
@@ -188,13 +174,7 @@ Expected<LyapunovMatrix<Size>, Error<double>> common_lyapunov_matrix(
     EigenMatrix<double, Size> v = EigenMatrix<double, Size>::Zero();
     const Square* violated = &a[0];
     for (const Square& mode : a) {
-      Square sum = Square::Identity();
-      for (int i = 0; i < Size; ++i) {
-        for (int j = 0; j < Size; ++j) {
-          for (int k = 0; k < Size; ++k) sum(i, j) += mode(k, i) * p(k, j) + p(i, k) * mode(k, j);
-        }
-      }
-      const auto found = detail::extremes<Size>(sum);
+      const auto found = extremes<Size>(Square::Identity() + mode.transpose() * p + p * mode);
       if (found.largest > excess) {
         excess = found.largest;
         v = found.at_largest;
@@ -203,18 +183,14 @@ Expected<LyapunovMatrix<Size>, Error<double>> common_lyapunov_matrix(
     }
     violation = excess;
     if (excess > 0.0) {
-      EigenMatrix<double, Size> moved = EigenMatrix<double, Size>::Zero();
-      for (int i = 0; i < Size; ++i) {
-        for (int k = 0; k < Size; ++k) moved(i) += (*violated)(i, k) * v(k);
-      }
-      add(v, moved);
+      add(v, *violated * v);
       if (!ellipsoid.cut(gradient, excess)) break;
       continue;
     }
 
     // log(largest^3 / smallest), twice the logarithm of gamma * largest. Its sublevel sets are
     // convex.
-    const auto values = detail::extremes<Size>(p);
+    const auto values = extremes<Size>(p);
     const double aim = 3.0 * std::log(values.largest) - std::log(values.smallest);
     if (aim < best) {
       best = aim;
@@ -227,11 +203,7 @@ Expected<LyapunovMatrix<Size>, Error<double>> common_lyapunov_matrix(
   if (!is_finite(best)) {
     return Error<double>{"system", violation, "has no Lyapunov matrix common to all modes"};
   }
-  return detail::with_eigenvalues<Size>(best_p);
+  return with_eigenvalues<Size>(best_p);
 }
 
-}  // namespace esokit
-
-#if defined(ESOKIT_HEADER_ONLY)
-#include <esokit/analysis/impl/lyapunov_matrix.ipp>
-#endif
+}  // namespace analysis

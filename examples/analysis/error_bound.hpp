@@ -4,14 +4,18 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <esokit/analysis/lyapunov_matrix.hpp>
+#include <cstddef>
+
 #include <esokit/math/combinatorics.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/sim/continuous_observer.hpp>
 
-namespace esokit {
+#include "analysis/lyapunov_matrix.hpp"
+
+namespace analysis {
 
 /// Upper limits of the sources of the error.
 struct ErrorSources {
@@ -75,8 +79,6 @@ struct ErrorBound {
   }
 };
 
-namespace detail {
-
 inline Check<double> check_sources(const ErrorSources& sources) {
   return Rules<double>{}
       .not_negative("disturbance_rate", sources.disturbance_rate)
@@ -138,8 +140,6 @@ Expected<ErrorBound<Size>, Error<double>> bound_between(const EigenMatrix<double
       sources.disturbance_rate + std::pow(bandwidth, Size) * gain * sources.measurement_noise);
 }
 
-}  // namespace detail
-
 /// Bound for the continuous linear ESO: K. Lakomy, R. Madonski, ISA Transactions 109 (2021), (11),
 /// with P from (8) and the corrections: norm(kappa) for kappa_max, squared norms in (7).
 ///
@@ -152,12 +152,12 @@ Expected<ErrorBound<Size>, Error<double>> linear_error_bound(
     const ErrorSources& sources) {
   const double w = config.observer_bandwidth;
   Rules<double> rules;
-  rules.positive("observer_bandwidth", w).all_of(detail::check_sources(sources));
+  rules.positive("observer_bandwidth", w).all_of(check_sources(sources));
   if (!rules) return rules.error();
-  const EigenMatrix<double, Size> gain = detail::binomial_gain<Size>();
-  const auto lyapunov = lyapunov_matrix<Size>(detail::scaled_error_matrix<Size>(gain));
+  const EigenMatrix<double, Size> gain = binomial_gain<Size>();
+  const auto lyapunov = lyapunov_matrix<Size>(scaled_error_matrix<Size>(gain));
   if (!lyapunov) return lyapunov.error();
-  return detail::bound_from(
+  return bound_from(
       *lyapunov, w,
       sources.disturbance_rate + std::pow(w, Size) * gain.norm() * sources.measurement_noise);
 }
@@ -181,14 +181,14 @@ Expected<Array<ErrorBound<Size>, Levels>, Error<double>> cascade_error_bounds(
     const ContinuousCascadeEsoConfig<Size, Levels, double, EqualPoles>& config,
     const ErrorSources& sources) {
   static_assert(Order >= 1 && Order < Size, "esokit: the order leaves no extended state");
-  const auto levels = detail::level_specs<EqualPoles, Size, Levels, double>(config);
+  const auto levels = esokit::detail::level_specs<EqualPoles, Size, Levels, double>(config);
   if (!levels) return levels.error();
   const Array<double, Levels>& w = levels->specs;
   Rules<double> rules;
-  rules.all_of(detail::check_sources(sources)).positive(levels->field, w);
+  rules.all_of(check_sources(sources)).positive(levels->field, w);
   if (!rules) return rules.error();
-  const EigenMatrix<double, Size> gain = detail::binomial_gain<Size>();
-  const auto lyapunov = lyapunov_matrix<Size>(detail::scaled_error_matrix<Size>(gain));
+  const EigenMatrix<double, Size> gain = binomial_gain<Size>();
+  const auto lyapunov = lyapunov_matrix<Size>(scaled_error_matrix<Size>(gain));
   if (!lyapunov) return lyapunov.error();
 
   Array<ErrorBound<Size>, Levels> bounds{};
@@ -215,7 +215,7 @@ Expected<Array<ErrorBound<Size>, Levels>, Error<double>> cascade_error_bounds(
                  return disturbance(r) ? row(j + 1, r) - row(j, r) : 0.0;
                });
     }
-    const auto bound = detail::bound_from(*lyapunov, w[i], drive);
+    const auto bound = bound_from(*lyapunov, w[i], drive);
     if (!bound) return bound.error();
     bounds[i] = *bound;
   }
@@ -242,9 +242,9 @@ Expected<ErrorBound<Size>, Error<double>> switched_error_bound(const SwitchedBan
   rules.positive("factor_while_shrinking", setting.factor_while_shrinking)
       .positive("factor_otherwise", setting.factor_otherwise);
   if (!rules) return rules.error();
-  return detail::bound_between<Size>(detail::binomial_gain<Size>(setting.factor_while_shrinking),
-                                     detail::binomial_gain<Size>(setting.factor_otherwise),
-                                     setting.observer_bandwidth, sources);
+  return bound_between<Size>(binomial_gain<Size>(setting.factor_while_shrinking),
+                             binomial_gain<Size>(setting.factor_otherwise),
+                             setting.observer_bandwidth, sources);
 }
 
 /// An observer whose gains are k(e) times those of the bandwidth.
@@ -267,9 +267,9 @@ Expected<ErrorBound<Size>, Error<double>> nonlinear_error_bound(const GainRange&
               {"gain_max", setting.gain_max, "must be finite and not below gain_min", -1,
                setting.gain_min, true});
   if (!rules) return rules.error();
-  const EigenMatrix<double, Size> gain = detail::binomial_gain<Size>();
-  return detail::bound_between<Size>(setting.gain_min * gain, setting.gain_max * gain,
-                                     setting.observer_bandwidth, sources);
+  const EigenMatrix<double, Size> gain = binomial_gain<Size>();
+  return bound_between<Size>(setting.gain_min * gain, setting.gain_max * gain,
+                             setting.observer_bandwidth, sources);
 }
 
-}  // namespace esokit
+}  // namespace analysis
