@@ -56,10 +56,6 @@ read -r -a flags < <(pkg-config --cflags esokit-compiled)
 "${CXX:-c++}" -std=c++20 "${flags[@]}" tests/consumer/workstation.cpp "$work/esokit.o" -o "$work/workstation"
 "$work/workstation"
 "$work/by_pkg_config"
-read -r -a flags < <(pkg-config --cflags esokit-compiled)
-"${CXX:-c++}" -std=c++20 "${flags[@]}" -c "$(pkg-config --variable=source esokit-compiled)" -o "$work/esokit.o"
-"${CXX:-c++}" -std=c++20 "${flags[@]}" tests/consumer/workstation.cpp "$work/esokit.o" -o "$work/workstation"
-"$work/workstation"
 
 # --- FetchContent, with the lines of README.md ---
 mkdir "$work/fetch"

@@ -89,38 +89,9 @@ class CycleAnalysis {
     const Fit whole = fit(one, three, scatter, S(0));
     const Split& at = whole.at;
     const S loss = whole.loss;
-    if (!(at.angle > S(0)) || at.angle > S(1.5)) {
-      return E{
-          "latency", at.angle / frequency_,
-          "does not fit: friction or damping is too large for this amplitude, the cycle is too "
-          "short (hysteresis, half_period), or the order or the sign of amplitude is wrong"};
-    }
     // Relative to b0 A, or to the frequency.
     const S share = Order == 1 ? loss : S(loss / at.gain());
-    if (Order == 2 && share > S(0.25))
-      return E{"friction",
-               share,
-               "as a share of b0 A is too large: use a larger amplitude; must be at most",
-               -1,
-               S(0.25),
-               true};
-    if (Order == 1 && share > S(1))
-      return E{"pole",
-               share,
-               "as a share of the frequency is too large: use a smaller hysteresis or half_period; "
-               "must be at most",
-               -1,
-               S(1),
-               true};
-    if (detail::absolute(at.misfit) > S(0.5) && detail::absolute(at.misfit) > S(2) * scatter) {
-      return E{"misfit",
-               at.misfit,
-               "of the third harmonic, rad, is too large: the machine has another order or more "
-               "than lag and dead time, or damping or friction is too large; must be at most",
-               -1,
-               S(0.5),
-               true};
-    }
+    if (const auto ok = fits(at, share, scatter); !ok) return ok.error();
     S unsure = std::sqrt(at.misfit * at.misfit + scatter * scatter);
     // If u has no third harmonic, or noise hides it, lag and dead time are not separated.
     if (!is_finite(unsure) || unsure > S(1)) unsure = S(1);
@@ -220,6 +191,44 @@ class CycleAnalysis {
     const S c = std::cos(expected), s = std::sin(expected);
     at.misfit = std::atan2(three.re * s + three.im * c, three.re * c - three.im * s);
     return at;
+  }
+
+  /// The rules of a result. @param share of the loss, relative to b0 A or to the frequency
+  /// @param scatter of the angle of H_3
+  [[nodiscard]] Check<S> fits(const Split& at, S share, S scatter) const noexcept {
+    if (!(at.angle > S(0)) || at.angle > S(1.5)) {
+      return Error<S>{
+          "latency", at.angle / frequency_,
+          "does not fit: friction or damping is too large for this amplitude, the cycle is too "
+          "short (hysteresis, half_period), or the order or the sign of amplitude is wrong"};
+    }
+    if (Order == 2 && share > S(0.25))
+      return Error<S>{"friction",
+                      share,
+                      "as a share of b0 A is too large: use a larger amplitude; must be at most",
+                      -1,
+                      S(0.25),
+                      true};
+    if (Order == 1 && share > S(1))
+      return Error<S>{
+          "pole",
+          share,
+          "as a share of the frequency is too large: use a smaller hysteresis or half_period; "
+          "must be at most",
+          -1,
+          S(1),
+          true};
+    if (detail::absolute(at.misfit) > S(0.5) && detail::absolute(at.misfit) > S(2) * scatter) {
+      return Error<S>{
+          "misfit",
+          at.misfit,
+          "of the third harmonic, rad, is too large: the machine has another order or more "
+          "than lag and dead time, or damping or friction is too large; must be at most",
+          -1,
+          S(0.5),
+          true};
+    }
+    return {};
   }
 
   static ComplexNumber plus(const ComplexNumber& a, const ComplexNumber& b, S factor) noexcept {

@@ -259,11 +259,54 @@ class Run {
     }
   }
 
+  /// The reference without its derivatives.
+  ESOKIT_INLINE static auto of_channels(const Reference& reference) {
+    if constexpr (Types::references > 1 && !Types::derivatives) {
+      return reference;
+    } else {
+      return reference(0);
+    }
+  }
+
+  /// The controller's u.
+  ESOKIT_INLINE static Input asked(C& controller, const Output& measurement,
+                                   const Reference& reference, bool plain) {
+    Input u;
+    with(reference, plain, [&](const auto& r) ESOKIT_INLINE_LAMBDA {
+      using Wanted = ScalarOrVector<Own, Types::inputs>;
+      u = in_scalar<S>(
+          static_cast<Wanted>(esokit::detail::command(controller, in_scalar<Own>(measurement), r)));
+    });
+    return u;
+  }
+
+  [[nodiscard]] Check<Time> allowed(Time passed) const {
+    if (esokit::detail::at_most(shortest(), passed) &&
+        esokit::detail::at_most(passed, Time(sample_time_ * Time(10)))) {
+      return {};
+    }
+    return Error<Time>{"step_time", passed,       "must be 0.1 .. 10 times sample_time, which is",
+                       -1,          sample_time_, true};
+  }
+
+  /// Moves x through the stretches of the sample at t. @return false if the disturbance was not
+  /// finite
+  template <class Disturbance>
+  ESOKIT_INLINE bool pass(const Time& t, typename P::State& x, Disturbance& disturbance) {
+    bool good = true;
+    for (std::size_t i = 0; i < stretches_.size(); ++i) {
+      const Time start = t + stretches_[i].start;
+      const auto& d = disturbance.at(start);
+      good = good && disturbance.finite();
+      x = steps_[i](start, x, inputs_[stretches_[i].age], d);
+    }
+    return good;
+  }
+
   /// @tparam Even all samples are equally long @tparam Direct each is one stretch under its own u
   /// @tparam Plain the measurement is y, and y needs no product with C
   template <bool Even, bool Direct, bool Plain = false, class Callback>
   [[gnu::__noinline__]] Outcome drive(C controller, Callback& on_sample) {
-    constexpr bool channels = Types::references > 1 && !Types::derivatives;
     // Local copies of everything that is used in every sample, so that the compiler knows that
     // nothing changes it.
     auto x = config_.state;
@@ -295,33 +338,18 @@ class Run {
       if constexpr (controller_traits<C>.takes_measured) {
         controller.measured(in_scalar<Own>(config_.measured(t)(0)));
       }
-      Input u;
-      with(reference.now(), plain, [&](const auto& r) ESOKIT_INLINE_LAMBDA {
-        using Wanted = ScalarOrVector<Own, Types::inputs>;
-        u = in_scalar<S>(static_cast<Wanted>(
-            esokit::detail::command(controller, in_scalar<Own>(measurement), r)));
-      });
+      const Input u = asked(controller, measurement, reference.now(), plain);
       if (!finite_throughout(u)) [[unlikely]] {
         return Error<Time>{"controller", t, "gave an input that is not finite at this time"};
       }
       Time end = config_.start_time + static_cast<Time>(k + 1) * sample_time_;
       if constexpr (!Even) {
         passed = chance_.step_time(k, sample_time_);
-        if (!esokit::detail::at_most(shortest(), passed) ||
-            !esokit::detail::at_most(passed, Time(sample_time_ * Time(10)))) {
-          return Error<Time>{
-              "step_time", passed,       "must be 0.1 .. 10 times sample_time, which is",
-              -1,          sample_time_, true};
-        }
+        if (const auto ok = allowed(passed); !ok) return ok.error();
         clock.add(passed);
         end = clock.value();
       }
-      RunSample<P, C> sample{k, t, x, y, measurement, {}, u};
-      if constexpr (channels) {
-        sample.reference = reference.now();
-      } else {
-        sample.reference = reference.now()(0);
-      }
+      RunSample<P, C> sample{k, t, x, y, measurement, of_channels(reference.now()), u};
       (void)reference.at(end);
       if constexpr (controller_traits<C>.two_phases) {
         with(reference.now(), plain, [&](const auto& r) { (void)controller.prepare(r); });
@@ -341,12 +369,7 @@ class Run {
           if (auto ok = cut(passed); !ok) return ok.error();
           lengths_.push(passed);
         }
-        for (std::size_t i = 0; i < stretches_.size(); ++i) {
-          const Time start = t + stretches_[i].start;
-          const auto& d = disturbance.at(start);
-          good = good && disturbance.finite();
-          x = steps_[i](start, x, inputs_[stretches_[i].age], d);
-        }
+        good = pass(t, x, disturbance);
       }
       if (!good) [[unlikely]] {
         return Error<Time>{"disturbance", t, "is not finite in the sample at this time"};

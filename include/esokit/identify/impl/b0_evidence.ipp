@@ -17,18 +17,45 @@ namespace esokit {
 
 namespace detail {
 
+/// Upper ends of the ranges except the last; ranges with a single value are merged.
+inline std::vector<double> schedule_edges(std::vector<double> along, int bins) {
+  std::sort(along.begin(), along.end());
+  std::vector<double> edges;
+  for (int bin = 1; bin < bins; ++bin) {
+    const double edge =
+        along[along.size() * static_cast<std::size_t>(bin) / static_cast<std::size_t>(bins)];
+    if (edge > along.front() && (edges.empty() || edge > edges.back())) edges.push_back(edge);
+  }
+  return edges;
+}
+
+/// How far the b0 of the ranges differ from each other; above 1 by more than chance. One of several
+/// may differ by chance: all together must differ by more than chance, and one by more than its
+/// interval. @param t Student's factor
+inline double schedule_shift(const std::vector<double>& value, const std::vector<double>& error,
+                             std::size_t ranges, double t) {
+  double weights = 0.0, middle = 0.0, square = 0.0, most = 0.0;
+  for (std::size_t bin = 0; bin < ranges; ++bin) {
+    const double weight = 1.0 / (error[bin] * error[bin]);
+    weights += weight;
+    middle += weight * value[bin];
+  }
+  middle /= weights;
+  for (std::size_t bin = 0; bin < ranges; ++bin) {
+    const double off = (std::abs)(value[bin] - middle) / error[bin];
+    square += off * off;
+    most = (std::max)(most, off / t);
+  }
+  const double freedom = static_cast<double>(ranges) - 1.0;
+  const double cube = 1.0 - 2.0 / (9.0 * freedom) + 1.645 * std::sqrt(2.0 / (9.0 * freedom));
+  return freedom > 0.0 ? (std::min)(most, std::sqrt(square / (freedom * cube * cube * cube))) : 0.0;
+}
+
 ESOKIT_FUNCTION void find_schedule(const FitData& used, const std::vector<double>& along,
                                    const FitModel& model, const IdentifyOptions& options,
                                    Identified& result) {
   const double t = student_95(19);
-  std::vector<double> sorted = along;
-  std::sort(sorted.begin(), sorted.end());
-  std::vector<double> edges;  // upper ends except the last; ranges with a single value are merged
-  for (int bin = 1; bin < options.schedule_bins; ++bin) {
-    const double edge = sorted[sorted.size() * static_cast<std::size_t>(bin) /
-                               static_cast<std::size_t>(options.schedule_bins)];
-    if (edge > sorted.front() && (edges.empty() || edge > edges.back())) edges.push_back(edge);
-  }
+  const std::vector<double> edges = schedule_edges(along, options.schedule_bins);
   FitData parts = used;
   parts.inputs.assign(edges.size(), std::vector<double>(along.size(), 0.0));
   result.schedule.assign(edges.size() + 1, {});
@@ -76,25 +103,10 @@ ESOKIT_FUNCTION void find_schedule(const FitData& used, const std::vector<double
   };
   std::vector<double> value, error;
   solved(parts, value, error);
-  double weights = 0.0, middle = 0.0, square = 0.0, most = 0.0;
   for (std::size_t bin = 0; bin < result.schedule.size(); ++bin) {
     result.schedule[bin].input_gain = {value[bin], t * error[bin]};
-    const double weight = 1.0 / (error[bin] * error[bin]);
-    weights += weight;
-    middle += weight * value[bin];
   }
-  middle /= weights;
-  // One of several ranges may differ by chance: all together must differ by more than chance, and
-  // one by more than its interval.
-  for (std::size_t bin = 0; bin < result.schedule.size(); ++bin) {
-    const double off = (std::abs)(value[bin] - middle) / error[bin];
-    square += off * off;
-    most = (std::max)(most, off / t);
-  }
-  const double freedom = static_cast<double>(result.schedule.size()) - 1.0;
-  const double cube = 1.0 - 2.0 / (9.0 * freedom) + 1.645 * std::sqrt(2.0 / (9.0 * freedom));
-  result.schedule_shift =
-      freedom > 0.0 ? (std::min)(most, std::sqrt(square / (freedom * cube * cube * cube))) : 0.0;
+  result.schedule_shift = schedule_shift(value, error, result.schedule.size(), t);
   FitData line = used;
   line.inputs.assign(1, std::vector<double>(along.size()));
   for (std::size_t k = 0; k < along.size(); ++k) line.inputs[0][k] = used.u[k] * (along[k] - mean);

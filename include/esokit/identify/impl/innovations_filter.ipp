@@ -145,8 +145,14 @@ struct InnovationsFilter {
       f.column[static_cast<std::size_t>(i)] =
           f.phi[static_cast<std::size_t>(i)][static_cast<std::size_t>(n)] / std::pow(w, n);
     }
+    f.take_gains(w * w * T * T, data, cached);
+    return f;
+  }
+
+  /// The gains from the cache, which receives them if it has none.
+  void take_gains(double q, const FitData& data, GainTables& cached) {
     const auto known = std::find_if(cached.begin(), cached.end(), [&](const auto& one) {
-      return one != nullptr && one->bandwidth == w && one->pole == point.pole;
+      return one != nullptr && one->bandwidth == w && one->pole == pole;
     });
     // The one that was found, or else the oldest, becomes the first.
     std::rotate(cached.begin(), known == cached.end() ? known - 1 : known,
@@ -154,12 +160,11 @@ struct InnovationsFilter {
     if (known == cached.end()) {
       auto fresh = std::make_shared<GainTable>();
       fresh->bandwidth = w;
-      fresh->pole = point.pole;
-      f.find_gains(w * w * T * T, data, *fresh);
+      fresh->pole = pole;
+      find_gains(q, data, *fresh);
       cached.front() = std::move(fresh);
     }
-    f.table = cached.front();
-    return f;
+    table = cached.front();
   }
 
   using Variances = std::array<Vector, static_cast<std::size_t>(N)>;
@@ -303,6 +308,50 @@ struct InnovationsFilter {
     return s;
   }
 
+  /// How row k of a piece corrects the state.
+  struct Row {
+    const double* gain;
+    double weight;
+    double value;       // y
+    double late = 0.0;  // s after the row
+    bool seen = true;
+  };
+
+  /// @param begin first row of the piece @param at of the last measurement that was not at its row
+  /// @param measurements of the piece @param waited rows without one since
+  [[nodiscard]] ESOKIT_INLINE Row row_of(const FitData& data, const GainsFromStart& start,
+                                         std::ptrdiff_t begin, std::ptrdiff_t k, Sight& at,
+                                         std::size_t& measurements, std::size_t& waited) const {
+    const auto here = static_cast<std::size_t>(k);
+    const std::size_t number =
+        (std::min)(static_cast<std::size_t>(k - begin), start.weights.size() - 1);
+    Row row{start.gains.data() + number * static_cast<std::size_t>(N), start.weights[number],
+            data.y[here]};
+    if (data.measured.empty()) return row;
+    // The gains of a start are those of measurements at their rows: other speeds than those between
+    // the rows would be wrong for long.
+    if (k - begin < 2 * N) {
+      ++measurements;
+    } else if (data.has(here)) {
+      row.late = data.offsets[here];
+      at = sight(start, row.late, measurements++, std::exchange(waited, 0));
+      row.gain = at.gain.data();
+      row.weight = at.weight;
+      row.value = data.measured[here];
+    } else {
+      row.seen = false;
+      ++waited;
+    }
+    return row;
+  }
+
+  /// The mean of v from its row to a measurement `late` after it: v goes to where it would end.
+  [[nodiscard]] double mean_lag(double late, double v_before, double v, double v_after) const {
+    const double row_from = late > 0.0 ? v : v_before, row_to = late > 0.0 ? v_after : v;
+    const double end = row_from + (row_to - row_from) / (1.0 - lag_decay);
+    return end - (v - end) * std::expm1(-late / tau) * tau / late;
+  }
+
   /// Computes innovations of y, u and the data's columns, each alone (one output for each), or of
   /// all of them together. `signal` is u or a replacement.
   ///
@@ -337,7 +386,6 @@ struct InnovationsFilter {
       }
       if (begin == to) continue;
       const GainsFromStart& start = begun && goes_on ? table->next : table->first;
-      const std::size_t steady = start.weights.size() - 1;
       begun = true;
       std::array<double, static_cast<std::size_t>(Runs)> r_now{};
       for (std::size_t run = 0; run < x.size(); ++run) {
@@ -352,35 +400,12 @@ struct InnovationsFilter {
       Sight at;
       at.seen[0] = 1.0;
       for (std::ptrdiff_t k = begin; k < to; ++k) {
-        const std::size_t row = (std::min)(static_cast<std::size_t>(k - begin), steady);
-        const double* gain = start.gains.data() + row * static_cast<std::size_t>(N);
-        double weight = start.weights[row];
-        double value = data.y[static_cast<std::size_t>(k)];
+        const Row row = row_of(data, start, begin, k, at, measurements, waited);
         const double u_next = u(k - delay + 1);
         const double v_after =
             lag_decay * v + lag_previous * u_before + lag_current * u_now + lag_next * u_next;
-        double v_late = v;  // its mean up to the measurement
-        bool seen = true;
-        // The gains of a start are those of measurements at their rows: other speeds than those
-        // between the rows would be wrong for long.
-        if (!regular && k - begin < 2 * N) {
-          ++measurements;
-        } else if (!regular && data.has(static_cast<std::size_t>(k))) {
-          const double late = data.offsets[static_cast<std::size_t>(k)];
-          at = sight(start, late, measurements++, std::exchange(waited, 0));
-          gain = at.gain.data();
-          weight = at.weight;
-          value = data.measured[static_cast<std::size_t>(k)];
-          if (order == 1 && late != 0.0) {
-            // v goes to where it would end.
-            const double row_from = late > 0.0 ? v : v_before, row_to = late > 0.0 ? v_after : v;
-            const double end = row_from + (row_to - row_from) / (1.0 - lag_decay);
-            v_late = end - (v - end) * std::expm1(-late / tau) * tau / late;
-          }
-        } else if (!regular) {
-          seen = false;
-          ++waited;
-        }
+        const double v_late =
+            order == 1 && row.late != 0.0 ? mean_lag(row.late, v_before, v, v_after) : v;
         const std::ptrdiff_t after = (std::min)(k + 1, to - 1);
         Vector pushed;
         for (std::size_t j = 0; j < pushed.size(); ++j) {
@@ -389,14 +414,14 @@ struct InnovationsFilter {
         for (std::size_t run = 0; run < x.size(); ++run) {
           Vector& state = x[run];
           const double b = input(run);
-          double e = output(run) * value - state[0];
+          double e = output(run) * row.value - state[0];
           if (!regular) {
             e += state[0] - at.push * (b * v_late + r_now[run]);
             for (std::size_t j = 0; j < state.size(); ++j) e -= at.seen[j] * state[j];
-            if (!seen) e = 0.0;
+            if (!row.seen) e = 0.0;
           }
-          out[run][k] = e * weight;
-          for (std::size_t j = 0; j < state.size(); ++j) state[j] += gain[j] * e;
+          out[run][k] = e * row.weight;
+          for (std::size_t j = 0; j < state.size(); ++j) state[j] += row.gain[j] * e;
           const double r_next = column_at(run, after);
           const double r = 0.5 * (r_now[run] + r_next);
           r_now[run] = r_next;

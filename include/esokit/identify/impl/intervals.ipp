@@ -44,6 +44,72 @@ ESOKIT_FUNCTION std::pair<double, double> split_errors(const FitPoint& at,
   return {lag / t, dead_time / t};
 }
 
+namespace detail {
+
+/// Normal equations and squares of the stretches of a log, and their sums.
+struct StretchSums {
+  std::vector<std::vector<double>> normals, rights;
+  std::vector<double> squares, normal, right;
+  double square = 0.0;
+
+  StretchSums(const std::vector<std::vector<double>>& jacobian, const std::vector<double>& residual,
+              std::size_t stretches)
+      : normals(stretches),
+        rights(stretches),
+        squares(stretches),
+        normal(jacobian.size() * jacobian.size(), 0.0),
+        right(jacobian.size(), 0.0) {
+    const std::size_t rows = residual.size();
+    for (std::size_t s = 0; s < stretches; ++s) {
+      const std::size_t from = rows * s / stretches, to = rows * (s + 1) / stretches;
+      InnovationsFit::normal_equations(jacobian, residual, normals[s], rights[s], from, to);
+      for (std::size_t k = from; k < to; ++k) squares[s] += residual[k] * residual[k];
+      for (std::size_t i = 0; i < normal.size(); ++i) normal[i] += normals[s][i];
+      for (std::size_t i = 0; i < right.size(); ++i) right[i] += rights[s][i];
+      square += squares[s];
+    }
+  }
+
+  /// The Gauss-Newton step from all rows but those of stretch s.
+  [[nodiscard]] std::vector<double> step_without(std::size_t s) const {
+    std::vector<double> without = normal, step = right;
+    for (std::size_t i = 0; i < without.size(); ++i) without[i] -= normals[s][i];
+    for (std::size_t i = 0; i < step.size(); ++i) step[i] -= rights[s][i];
+    solve_normal(without, step, static_cast<int>(right.size()));
+    return step;
+  }
+};
+
+/// w, latency, squared lag and pole after a step. @param free numbers of what the step moves
+inline std::vector<double> point_after(const FitPoint& at, const std::vector<int>& free,
+                                       const std::vector<double>& step) {
+  double log_w = 0.0, log_latency = 0.0;
+  double share_square = at.lag_share * at.lag_share;
+  double product = at.pole * at.latency;
+  for (std::size_t i = 0; i < free.size(); ++i) {
+    const double by = std::clamp(-step[i], -0.7, 0.7);
+    switch (free[i]) {
+      case 0:
+        log_w = by;
+        break;
+      case 1:
+        log_latency = by;
+        break;
+      case 2:
+        // Not limited: at a limit all stretches would agree.
+        share_square -= step[i];
+        break;
+      default:
+        product += by;
+    }
+  }
+  const double latency = at.latency * std::exp(log_latency);
+  return {at.bandwidth * std::exp(log_w), latency, latency * latency * share_square,
+          product / latency};
+}
+
+}  // namespace detail
+
 ESOKIT_FUNCTION FitErrors jackknife(InnovationsFit& fit, const Fit& at, bool with_bandwidth,
                                     int stretches) {
   const auto sensitivities = fit.sensitivities(at, with_bandwidth, true);
@@ -51,20 +117,7 @@ ESOKIT_FUNCTION FitErrors jackknife(InnovationsFit& fit, const Fit& at, bool wit
   const auto& residual = fit.residual();
   const std::size_t count = jacobian.size();
   const std::size_t free = sensitivities.free.size();
-  const std::size_t rows = residual.size();
-  std::vector<std::vector<double>> normals(static_cast<std::size_t>(stretches));
-  std::vector<std::vector<double>> rights(static_cast<std::size_t>(stretches));
-  std::vector<double> squares(static_cast<std::size_t>(stretches));
-  std::vector<double> normal(count * count, 0.0), right(count, 0.0);
-  double square = 0.0;
-  for (std::size_t s = 0; s < normals.size(); ++s) {
-    const std::size_t from = rows * s / normals.size(), to = rows * (s + 1) / normals.size();
-    InnovationsFit::normal_equations(jacobian, residual, normals[s], rights[s], from, to);
-    for (std::size_t k = from; k < to; ++k) squares[s] += residual[k] * residual[k];
-    for (std::size_t i = 0; i < normal.size(); ++i) normal[i] += normals[s][i];
-    for (std::size_t i = 0; i < right.size(); ++i) right[i] += rights[s][i];
-    square += squares[s];
-  }
+  const detail::StretchSums sums(jacobian, residual, static_cast<std::size_t>(stretches));
   // The results without each stretch: w, latency, squared lag, pole, noise, linear, times.
   const std::size_t linear = free + at.linear.size();  // behind them
   const std::size_t quantities = 5 + count - free;
@@ -76,37 +129,12 @@ ESOKIT_FUNCTION FitErrors jackknife(InnovationsFit& fit, const Fit& at, bool wit
     }
   };
   std::vector<std::vector<double>> values;
-  for (std::size_t s = 0; s < normals.size(); ++s) {
-    std::vector<double> without = normal, step = right;
-    for (std::size_t i = 0; i < without.size(); ++i) without[i] -= normals[s][i];
-    for (std::size_t i = 0; i < step.size(); ++i) step[i] -= rights[s][i];
-    detail::solve_normal(without, step, static_cast<int>(count));
-    double log_w = 0.0, log_latency = 0.0;
-    double share_square = at.at.lag_share * at.at.lag_share;
-    double product = at.at.pole * at.at.latency;
-    for (std::size_t i = 0; i < free; ++i) {
-      const double by = std::clamp(-step[i], -0.7, 0.7);
-      switch (sensitivities.free[i]) {
-        case 0:
-          log_w = by;
-          break;
-        case 1:
-          log_latency = by;
-          break;
-        case 2:
-          // Not limited: at a limit all stretches would agree.
-          share_square -= step[i];
-          break;
-        default:
-          product += by;
-      }
-    }
-    const double latency = at.at.latency * std::exp(log_latency);
-    std::vector<double> value = {
-        at.at.bandwidth * std::exp(log_w), latency, latency * latency * share_square,
-        product / latency,
-        at.noise * std::sqrt((1.0 - squares[s] / square) * static_cast<double>(stretches) /
-                             static_cast<double>(stretches - 1))};
+  for (std::size_t s = 0; s < sums.squares.size(); ++s) {
+    const std::vector<double> step = sums.step_without(s);
+    std::vector<double> value = detail::point_after(at.at, sensitivities.free, step);
+    value.push_back(at.noise *
+                    std::sqrt((1.0 - sums.squares[s] / sums.square) *
+                              static_cast<double>(stretches) / static_cast<double>(stretches - 1)));
     for (std::size_t i = 0; i < at.linear.size(); ++i)
       value.push_back(at.linear[i] - step[free + i]);
     each_time([&](const TimedColumn& column, std::size_t i) {
@@ -132,7 +160,8 @@ ESOKIT_FUNCTION FitErrors jackknife(InnovationsFit& fit, const Fit& at, bool wit
   for (std::size_t q = 5; q < 5 + at.linear.size(); ++q) errors.linear.push_back(error(q));
   errors.times.resize(timed.size());
   if (linear == count) return errors;
-  detail::solve_normal(normal, right, static_cast<int>(count));
+  std::vector<double> right = sums.right;
+  detail::solve_normal(sums.normal, right, static_cast<int>(count));
   each_time([&](const TimedColumn& column, std::size_t i) {
     const std::size_t q = 5 + i - free;
     FitErrors::Times& found = errors.times[static_cast<std::size_t>(&column - timed.data())];

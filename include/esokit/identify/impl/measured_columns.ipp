@@ -117,95 +117,132 @@ ESOKIT_FUNCTION std::pair<double, double> time_step(std::vector<double> normal,
   return {right[m], off + along * right[m]};
 }
 
+/// The search for the times of one column, at one point of the model.
+class TimeSearch {
+ public:
+  TimeSearch(FitData& data, const FitModel& model, const FitBounds& bounds, const FitPoint& at,
+             std::size_t number)
+      : data_(data),
+        bounds_(bounds),
+        at_(at),
+        number_(number),
+        column_(data.timed[number]),
+        fit_(data, model, bounds),
+        rows_(fit_.at(at).rows),
+        own_(2 + data.inputs.size() + number),
+        parts_(fit_.parts()),
+        least_(square(linear_)) {}
+
+  /// Tries times over the whole range.
+  void look_around() {
+    const double T = data_.sample_time;
+    for (const double rows : {1.0, 2.5, 6.0, 15.0, 40.0, 100.0}) {
+      if (rows * T > bounds_.latency_max) break;
+      for (const double share : {0.0, 0.7, 1.0})
+        (void)attempt(rows * T, std::pow(share * rows * T, 2));
+    }
+  }
+
+  /// Goes down by steps of Gauss and Newton, damped.
+  void descend() {
+    double damping = 1e-3;
+    for (int step = 0; step < 8; ++step) {
+      std::vector<std::vector<double>> jacobian(parts_.begin() + 1, parts_.end());
+      for (auto& moves : fit_.time_sensitivities(at_, number_, linear_[own_ - 1]))
+        jacobian.push_back(std::move(moves));
+      std::vector<double> residual = parts_[0];
+      for (std::size_t i = 0; i < linear_.size(); ++i) {
+        for (std::size_t k = 0; k < residual.size(); ++k)
+          residual[k] += linear_[i] * parts_[i + 1][k];
+      }
+      std::vector<double> normal, right;
+      InnovationsFit::normal_equations(jacobian, residual, normal, right);
+      const double before = least_;
+      bool better = false;
+      const double latency = column_.latency, lag_square = column_.lag_square;
+      while (!better && damping < 1e4) {
+        // Both times, or one of them where the other is at zero.
+        for (const TimeSplit split : {TimeSplit::both, TimeSplit::lag, TimeSplit::dead_time}) {
+          const double along = split == TimeSplit::lag ? 2.0 * latency : 0.0;
+          const double off = split == TimeSplit::lag    ? lag_square - latency * latency
+                             : split == TimeSplit::both ? 0.0
+                                                        : lag_square;
+          const auto [by, square_by] = time_step(normal, right, damping, split, along, off);
+          if (attempt(latency - by, lag_square - square_by)) better = true;
+          if (split == TimeSplit::both && better && column_.lag_square > 0.0 &&
+              column_.lag_square < column_.latency * column_.latency)
+            break;
+        }
+        damping *= better ? 0.2 : 8.0;
+      }
+      if (!better || !(before - least_ > 1e-6 * least_)) break;
+    }
+  }
+
+  /// The best of so many times makes something of nothing: without the column the likelihood has to
+  /// be lower by more than the three numbers cost.
+  void drop_if_chance() {
+    std::fill(parts_[own_].begin(), parts_[own_].end(), 0.0);
+    const double rows = static_cast<double>(rows_);
+    column_.free = rows * std::log(square(linear_) / least_) > 3.0 * std::log(rows);
+    if (!column_.free) column_.latency = column_.lag_square = 0.0;
+  }
+
+ private:
+  /// Mean square with this column. @param linear receives the numbers of all
+  double square(std::vector<double>& linear) {
+    std::vector<double> normal;
+    InnovationsFit::normal_equations(std::span(parts_).subspan(1), parts_[0], normal, linear);
+    const std::vector<double> right = linear;
+    for (double& value : linear) value = -value;
+    solve_normal(normal, linear, static_cast<int>(linear.size()));
+    double sum = dot(parts_[0].data(), parts_[0].data(), parts_[0].size());
+    for (std::size_t i = 0; i < linear.size(); ++i) sum += linear[i] * right[i];
+    return sum;
+  }
+
+  /// Takes these times if they are better. @return whether they are
+  bool attempt(double latency, double lag_square) {
+    TimedColumn trial = column_;
+    trial.latency = std::clamp(latency, 0.0, bounds_.latency_max);
+    trial.lag_square = std::clamp(lag_square, 0.0, trial.latency * trial.latency);
+    std::vector<double> kept = parts_[own_], numbers;
+    parts_[own_] = fit_.column_innovations(at_, late(trial, data_.starts, data_.sample_time));
+    const double left = square(numbers);
+    if (!(left < least_)) {
+      parts_[own_] = std::move(kept);
+      return false;
+    }
+    least_ = left;
+    linear_ = std::move(numbers);
+    column_.latency = trial.latency;
+    column_.lag_square = trial.lag_square;
+    return true;
+  }
+
+  FitData& data_;
+  const FitBounds& bounds_;
+  const FitPoint& at_;
+  std::size_t number_;
+  TimedColumn& column_;
+  InnovationsFit fit_;
+  std::size_t rows_;
+  std::size_t own_;  ///< of the column among the parts
+  std::vector<std::vector<double>> parts_;
+  std::vector<double> linear_{};
+  double least_;
+};
+
 ESOKIT_FUNCTION void find_times(FitData& data, const FitModel& model, const FitBounds& bounds,
                                 const FitPoint& at, bool search) {
-  const double T = data.sample_time;
   for (int pass = 0; pass < 2; ++pass) {
     for (std::size_t c = 0; c < data.timed.size(); ++c) {
-      TimedColumn& column = data.timed[c];
-      if (!column.free) continue;
-      InnovationsFit fit(data, model, bounds);
-      const Fit best = fit.at(at);
-      std::vector<std::vector<double>> parts = fit.parts();
-      const std::size_t own = 2 + data.inputs.size() + c;
-      // Mean square with this column, and the numbers of all.
-      const auto square = [&](std::vector<double>& linear) {
-        std::vector<double> normal;
-        InnovationsFit::normal_equations(std::span(parts).subspan(1), parts[0], normal, linear);
-        const std::vector<double> right = linear;
-        for (double& value : linear) value = -value;
-        solve_normal(normal, linear, static_cast<int>(linear.size()));
-        double sum = dot(parts[0].data(), parts[0].data(), parts[0].size());
-        for (std::size_t i = 0; i < linear.size(); ++i) sum += linear[i] * right[i];
-        return sum;
-      };
-      std::vector<double> linear;
-      double least = square(linear);
-      const auto attempt = [&](double latency, double lag_square) {
-        TimedColumn trial = column;
-        trial.latency = std::clamp(latency, 0.0, bounds.latency_max);
-        trial.lag_square = std::clamp(lag_square, 0.0, trial.latency * trial.latency);
-        std::vector<double> kept = parts[own], numbers;
-        parts[own] = fit.column_innovations(at, late(trial, data.starts, T));
-        const double left = square(numbers);
-        if (!(left < least)) {
-          parts[own] = std::move(kept);
-          return false;
-        }
-        least = left;
-        linear = std::move(numbers);
-        column.latency = trial.latency;
-        column.lag_square = trial.lag_square;
-        return true;
-      };
-      if (search && pass == 0) {
-        for (const double rows : {1.0, 2.5, 6.0, 15.0, 40.0, 100.0}) {
-          if (rows * T > bounds.latency_max) break;
-          for (const double share : {0.0, 0.7, 1.0})
-            (void)attempt(rows * T, std::pow(share * rows * T, 2));
-        }
-      }
-      double damping = 1e-3;
-      for (int step = 0; step < 8; ++step) {
-        std::vector<std::vector<double>> jacobian(parts.begin() + 1, parts.end());
-        for (auto& moves : fit.time_sensitivities(at, c, linear[own - 1]))
-          jacobian.push_back(std::move(moves));
-        std::vector<double> residual = parts[0];
-        for (std::size_t i = 0; i < linear.size(); ++i) {
-          for (std::size_t k = 0; k < residual.size(); ++k)
-            residual[k] += linear[i] * parts[i + 1][k];
-        }
-        std::vector<double> normal, right;
-        InnovationsFit::normal_equations(jacobian, residual, normal, right);
-        const double before = least;
-        bool better = false;
-        const double latency = column.latency, lag_square = column.lag_square;
-        while (!better && damping < 1e4) {
-          // Both times, or one of them where the other is at zero.
-          for (const TimeSplit split : {TimeSplit::both, TimeSplit::lag, TimeSplit::dead_time}) {
-            const double along = split == TimeSplit::lag ? 2.0 * latency : 0.0;
-            const double off = split == TimeSplit::lag    ? lag_square - latency * latency
-                               : split == TimeSplit::both ? 0.0
-                                                          : lag_square;
-            const auto [by, square_by] = time_step(normal, right, damping, split, along, off);
-            if (attempt(latency - by, lag_square - square_by)) better = true;
-            if (split == TimeSplit::both && better && column.lag_square > 0.0 &&
-                column.lag_square < column.latency * column.latency)
-              break;
-          }
-          damping *= better ? 0.2 : 8.0;
-        }
-        if (!better || !(before - least > 1e-6 * least)) break;
-      }
-      if (search) {
-        // The best of so many times makes something of nothing: without the column the likelihood
-        // has to be lower by more than the three numbers cost.
-        std::fill(parts[own].begin(), parts[own].end(), 0.0);
-        const double rows = static_cast<double>(best.rows);
-        column.free = rows * std::log(square(linear) / least) > 3.0 * std::log(rows);
-        if (!column.free) column.latency = column.lag_square = 0.0;
-      }
-      data.columns[c] = late(column, data.starts, T);
+      if (!data.timed[c].free) continue;
+      TimeSearch times(data, model, bounds, at, c);
+      if (search && pass == 0) times.look_around();
+      times.descend();
+      if (search) times.drop_if_chance();
+      data.columns[c] = late(data.timed[c], data.starts, data.sample_time);
     }
     if (data.timed.size() < 2) break;
   }

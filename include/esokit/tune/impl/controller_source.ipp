@@ -9,6 +9,7 @@
 #include <esokit/tune/specification.hpp>
 #include <esokit/tune/tuning.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace esokit {
@@ -50,87 +51,97 @@ ESOKIT_FUNCTION std::string ControllerSource::text(const TuneModel& model) const
          "},  // u if y stays away: choose\n    " + soften + "});\n";
 }
 
-ESOKIT_FUNCTION ControllerSource controller_source(const TunedDesign& d, const TuneModel& model) {
-  const std::string n = std::to_string(model.order);
-  const auto list = [](const std::vector<double>& numbers) {
-    std::string text;
-    for (const double number : numbers) text += (text.empty() ? "" : ", ") + source(number);
-    return text;
-  };
-  const auto poles = [&](std::string text) {
-    for (const auto& p : d.settings.observer_poles) {
-      text += (text.empty() ? "{" : ", {") + source(p.real()) + ", " + source(p.imag()) + "}";
-    }
-    return ".poles = {{" + text + "}}";
-  };
-  std::string type, config;
-  const int predicted = model.predicted_samples();
-  const std::string gap = predicted > 100 ? ", .max_gap = " + std::to_string(predicted) : "";
-  if (d.knows.any()) {
-    type = "esokit::ModelEso<esokit::ModelParts{.order = " + n;
-    std::string parts;
-    const auto part = [&](const std::string& text) { parts += (parts.empty() ? "" : ", ") + text; };
-    if (d.knows.lag) {
-      type += ", .actuator = 1";
-      part(".actuator = {.time_constant = " + source(model.lag) + "}");
-    }
-    if (d.knows.sensor) {
-      type += ", .sensor = 1";
-      part(".sensor = {.time_constant = " + source(model.sensor) + "}");
-    }
-    if (d.knows.sinusoid) {
-      type += ", .resonators = 1";
-      part(".resonators = {{{.frequency = " + source(model.sinusoids.front().frequency) +
-           ", .capture_bandwidth = " + source(d.settings.capture_bandwidth) + "}}}");
-    }
-    const bool free = d.family == TuneFamily::free_poles;
-    type += d.family == TuneFamily::half_gain ? "}, double, esokit::HalfGainPoles>"
-            : free                            ? "}, double, esokit::PoleSet>"
-                                              : "}>";
-    // The pole of the lag is kept.
-    config = free ? poles("{-1.0 / " + source(model.lag) + ", 0.0}")
-                  : ".observer_bandwidth = " + source(d.settings.observer_bandwidth);
-    config += ", .input_gain = " + source(model.input_gain.value) +
-              ", .sample_time = " + source(model.sample_time) + ", .model = {" + parts + "}" + gap;
-  } else {
-    const std::string common = ".input_gain = " + source(model.input_gain.value) +
-                               ", .sample_time = " + source(model.sample_time);
-    const std::string bandwidth =
-        ".observer_bandwidth = " + source(d.settings.observer_bandwidth) + ", ";
-    switch (d.family) {
-      case TuneFamily::linear:
-        type = "esokit::LinearEso<" + n + (d.extension > 1 ? ", double, 2>" : ">");
-        config = bandwidth + common + gap;
-        break;
-      case TuneFamily::half_gain:
-        type = "esokit::HalfGainEso<" + n + ">";
-        config = bandwidth + common + gap;
-        break;
-      case TuneFamily::cascade:
-        type = "esokit::CascadeEso<" + n + ", " + std::to_string(d.levels) + ">";
-        config = bandwidth + ".bandwidth_factor = " + source(d.settings.bandwidth_factor) + ", " +
-                 common + gap;
-        break;
-      case TuneFamily::filter: {
-        type = "esokit::ExtendedStateFilter<" + n + ">";
-        std::vector<double> bounds(static_cast<std::size_t>(model.order), 0.0);
-        bounds.push_back(d.settings.disturbance_bound);
-        config = common + ", .measurement_variance = " + source(model.noise) + " * " +
-                 source(model.noise) + ", .disturbance_bounds = {{" + list(bounds) +
-                 "}}, .bound_factor = 1.0, .inflation_rule = esokit::InflationRule::none, "
-                 ".mode = esokit::RiccatiMode::frozen";
-        break;
-      }
-      case TuneFamily::free_poles:
-        type = "esokit::LinearEso<" + n + ", double, 1, esokit::PoleSet>";
-        config = poles("") + ", " + common + gap;
-        break;
-    }
+inline std::string source_list(const std::vector<double>& numbers) {
+  std::string text;
+  for (const double number : numbers) text += (text.empty() ? "" : ", ") + source(number);
+  return text;
+}
+
+/// @param kept the pole that the design keeps, or nothing
+inline std::string source_poles(const TunedDesign& d, std::string kept) {
+  for (const auto& p : d.settings.observer_poles) {
+    kept += (kept.empty() ? "{" : ", {") + source(p.real()) + ", " + source(p.imag()) + "}";
   }
+  return ".poles = {{" + kept + "}}";
+}
+
+/// `.max_gap`, where the dead time is longer than what it is by default.
+inline std::string source_gap(const TuneModel& model) {
+  const int predicted = model.predicted_samples();
+  return predicted > 100 ? ", .max_gap = " + std::to_string(predicted) : "";
+}
+
+/// Type and config of an observer that knows parts of the plant.
+inline std::pair<std::string, std::string> known_source(const TunedDesign& d,
+                                                        const TuneModel& model) {
+  std::string type = "esokit::ModelEso<esokit::ModelParts{.order = " + std::to_string(model.order);
+  std::string parts;
+  const auto part = [&](const std::string& text) { parts += (parts.empty() ? "" : ", ") + text; };
+  if (d.knows.lag) {
+    type += ", .actuator = 1";
+    part(".actuator = {.time_constant = " + source(model.lag) + "}");
+  }
+  if (d.knows.sensor) {
+    type += ", .sensor = 1";
+    part(".sensor = {.time_constant = " + source(model.sensor) + "}");
+  }
+  if (d.knows.sinusoid) {
+    type += ", .resonators = 1";
+    part(".resonators = {{{.frequency = " + source(model.sinusoids.front().frequency) +
+         ", .capture_bandwidth = " + source(d.settings.capture_bandwidth) + "}}}");
+  }
+  const bool free = d.family == TuneFamily::free_poles;
+  type += d.family == TuneFamily::half_gain ? "}, double, esokit::HalfGainPoles>"
+          : free                            ? "}, double, esokit::PoleSet>"
+                                            : "}>";
+  // The pole of the lag is kept.
+  return {type, (free ? source_poles(d, "{-1.0 / " + source(model.lag) + ", 0.0}")
+                      : ".observer_bandwidth = " + source(d.settings.observer_bandwidth)) +
+                    ", .input_gain = " + source(model.input_gain.value) + ", .sample_time = " +
+                    source(model.sample_time) + ", .model = {" + parts + "}" + source_gap(model)};
+}
+
+/// Type and config of an observer that knows the chain alone.
+inline std::pair<std::string, std::string> chain_source(const TunedDesign& d,
+                                                        const TuneModel& model) {
+  const std::string n = std::to_string(model.order);
+  const std::string common = ".input_gain = " + source(model.input_gain.value) +
+                             ", .sample_time = " + source(model.sample_time);
+  const std::string bandwidth =
+      ".observer_bandwidth = " + source(d.settings.observer_bandwidth) + ", ";
+  const std::string gap = source_gap(model);
+  switch (d.family) {
+    case TuneFamily::linear:
+      return {"esokit::LinearEso<" + n + (d.extension > 1 ? ", double, 2>" : ">"),
+              bandwidth + common + gap};
+    case TuneFamily::half_gain:
+      return {"esokit::HalfGainEso<" + n + ">", bandwidth + common + gap};
+    case TuneFamily::cascade:
+      return {"esokit::CascadeEso<" + n + ", " + std::to_string(d.levels) + ">",
+              bandwidth + ".bandwidth_factor = " + source(d.settings.bandwidth_factor) + ", " +
+                  common + gap};
+    case TuneFamily::filter: {
+      std::vector<double> bounds(static_cast<std::size_t>(model.order), 0.0);
+      bounds.push_back(d.settings.disturbance_bound);
+      return {"esokit::ExtendedStateFilter<" + n + ">",
+              common + ", .measurement_variance = " + source(model.noise) + " * " +
+                  source(model.noise) + ", .disturbance_bounds = {{" + source_list(bounds) +
+                  "}}, .bound_factor = 1.0, .inflation_rule = esokit::InflationRule::none, "
+                  ".mode = esokit::RiccatiMode::frozen"};
+    }
+    case TuneFamily::free_poles:
+      return {"esokit::LinearEso<" + n + ", double, 1, esokit::PoleSet>",
+              source_poles(d, "") + ", " + common + gap};
+  }
+  return {};
+}
+
+ESOKIT_FUNCTION ControllerSource controller_source(const TunedDesign& d, const TuneModel& model) {
+  const auto [type, config] = d.knows.any() ? known_source(d, model) : chain_source(d, model);
   return {type, config,
           d.settings.controller_bandwidth > 0.0
               ? ".controller_bandwidth = " + source(d.settings.controller_bandwidth)
-              : ".gains = {{" + list(d.settings.gains) + "}}",
+              : ".gains = {{" + source_list(d.settings.gains) + "}}",
           std::string(".soften = ") + (d.settings.soften ? "true" : "false")};
 }
 
