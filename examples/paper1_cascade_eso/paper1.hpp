@@ -21,8 +21,8 @@
 #include <esokit/eigen.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/sim/closed_loop.hpp>
-#include <esokit/sim/filtered_step.hpp>
 #include <esokit/sim/noise.hpp>
+#include <esokit/sim/signals.hpp>
 #include <esokit/sim/trapezoid.hpp>
 
 #include "common/report.hpp"

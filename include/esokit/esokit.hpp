@@ -163,7 +163,6 @@
 #include <esokit/observer/reduced_order_eso.hpp>
 #include <esokit/sim/butcher_tableau.hpp>
 #include <esokit/sim/closed_loop.hpp>
-#include <esokit/sim/combined_signals.hpp>
 #include <esokit/sim/continuous_certificate.hpp>
 #include <esokit/sim/continuous_gain_law.hpp>
 #include <esokit/sim/continuous_observer.hpp>
@@ -173,8 +172,6 @@
 #include <esokit/sim/detail/run_signal.hpp>
 #include <esokit/sim/disturbed_plant.hpp>
 #include <esokit/sim/dormand_prince.hpp>
-#include <esokit/sim/elementary_signals.hpp>
-#include <esokit/sim/filtered_step.hpp>
 #include <esokit/sim/gaussian.hpp>
 #include <esokit/sim/held_plant.hpp>
 #include <esokit/sim/measure.hpp>

@@ -14,9 +14,9 @@
 #include <esokit/core/packed.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/observer/linear_eso.hpp>
-#include <esokit/sim/filtered_step.hpp>
 #include <esokit/sim/held_plant.hpp>
 #include <esokit/sim/run.hpp>
+#include <esokit/sim/signals.hpp>
 #include <limits>
 #include <string>
 #include <support/refusal.hpp>
