@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <esokit/adapter/mapped_input.hpp>
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/resting.hpp>
@@ -35,11 +36,13 @@ typename Axis<S>::Config config(double error = 1.5 * count, double time = 0.25) 
 /// An axis with stiction and Coulomb friction, y by an encoder.
 struct Joint {
   double stick = 60, coulomb = 20, load = 0, x = 0, v = 0;
+  double b0 = 50, dead = 0;
   void step(double u) {
     constexpr int parts = 20;
     constexpr double h = T / parts;
+    const double acts = std::abs(u) < dead ? 0 : u - std::copysign(dead, u);
     for (int i = 0; i < parts; ++i) {
-      const double f = 50 * u + load;
+      const double f = b0 * acts + load;
       if (!(std::abs(v) > 0) && std::abs(f) <= stick) continue;
       const double sign = std::copysign(1.0, std::abs(v) > 0 ? v : f);
       const double next = v + h * (f - coulomb * sign - 3 * v);
@@ -369,6 +372,122 @@ TEST(Resting, AroundAdaptersAndInLanes) {
   }
   EXPECT_EQ(packed[0].mode(), LoopMode::rest);
   EXPECT_EQ(packed[1].mode(), LoopMode::running);
+}
+
+// ---- Behind an actuator with a dead zone.
+
+template <class S = double>
+using Mapped = Resting<Adrc<MappedInput<LinearEso<2, S>>>>;
+
+/// A dead zone of 3 in the map, whose jump is a slope of five.
+template <class S = double>
+typename Mapped<S>::Config mapped_config(double b0, double error = 1.5 * count) {
+  typename Mapped<S>::Config all{};
+  all.controller.observer.observer = config<S>().controller.observer;
+  all.controller.observer.observer.input_gain = static_cast<S>(b0);
+  all.controller.observer.curve = ActuatorCurve<S>::dead_zone(S(3), S(0.75));
+  all.controller.controller_bandwidth = S(20);
+  all.controller.limits = {.lower = S(-12), .upper = S(12)};
+  all.rest = {.error = static_cast<S>(error), .time = S(error > 0 ? 0.25 : 0)};
+  return all;
+}
+
+/// With stiction, whatever the dead zone is: at rest within the band, which is known to half a
+/// count. Without rest some of them hunt.
+template <class S>
+void rests_behind_a_dead_zone() {
+  Random random(672);
+  int hunt = 0;
+  for (int i = 0; i < 16; ++i) {
+    const double dead = random.uniform(0, 3.6);
+    const double b0 = i % 2 == 0 ? 50 : -50;
+    SCOPED_TRACE(dead);
+    auto resting = Mapped<S>::make(mapped_config<S>(b0)).value();
+    auto hunting = Mapped<S>::make(mapped_config<S>(b0, 0)).value();
+    Joint a{.stick = 30, .coulomb = 15, .b0 = b0, .dead = dead}, b = a;
+    run(resting, a, 10000, 1);
+    run(hunting, b, 10000, 1);
+    const Course rests = run(resting, a, 10000, 1);
+    EXPECT_EQ(rests.way, 0);
+    EXPECT_EQ(rests.rests, 10000);
+    EXPECT_LE(rests.largest, 2 * count);
+    hunt += run(hunting, b, 10000, 1).way > count ? 1 : 0;
+  }
+  EXPECT_GT(hunt, 0);
+}
+TEST(Resting, BehindADeadZone) {
+  rests_behind_a_dead_zone<double>();
+  rests_behind_a_dead_zone<float>();
+}
+
+/// A load that comes slowly is answered at the edge of the band here, too.
+TEST(Resting, BehindADeadZoneMasksNoLoad) {
+  for (const double dead : {2.4, 3.0, 3.6}) {
+    for (const double ramp : {3.0, -30.0, 100.0}) {
+      SCOPED_TRACE(std::to_string(dead) + ' ' + std::to_string(ramp));
+      auto resting = Mapped<>::make(mapped_config(50)).value();
+      auto plain = Mapped<>::make(mapped_config(50, 0)).value();
+      Joint a{.stick = 30, .coulomb = 15, .dead = dead}, b = a;
+      run(resting, a, 10000, 1);
+      run(plain, b, 10000, 1);
+      EXPECT_EQ(resting.mode(), LoopMode::rest);
+      const int samples = std::min(static_cast<int>(300 / std::abs(ramp) / T), 30000);
+      const Course with = run(resting, a, samples, 1, ramp);
+      const Course without = run(plain, b, samples, 1, ramp);
+      // What breaks away is also faster by the force that is missing while u crosses the slope, of
+      // which the actuator gives nothing below 0.6, and by what the map lacks.
+      const double band = 1.5 * count + 0.5 * count;
+      const double force = 15 + 50 * (0.6 + std::abs(dead - 3));
+      EXPECT_LT(with.largest,
+                std::max(without.largest + count, band + beyond(std::sqrt(2 * force * 2 * band))));
+      const double effect = resting.observer().effect_of(resting.output());
+      // What the map lacks, what sticks, and what came in the time of the loop.
+      EXPECT_NEAR(50 * effect, -a.load, 50 * std::abs(dead - 3) + 30 + 0.1 * std::abs(ramp));
+    }
+  }
+}
+
+/// What is held is u, whatever its effect; a snapshot goes on there, and each lane of a pack rests
+/// by itself.
+TEST(Resting, BehindADeadZoneInSnapshotsAndLanes) {
+  for (const double b0 : {50.0, -50.0}) {
+    auto c = Mapped<>::make(mapped_config(b0, 0.25)).value();
+    c.start(1, 4);
+    for (int k = 0; k < 300; ++k) c.update(1, 1);
+    ASSERT_EQ(c.mode(), LoopMode::rest);
+    const double held = c.output();
+    EXPECT_NEAR(held, 4, 1e-9);
+    auto again = from_snapshot<Mapped<>>(snapshot(c)).value();
+    EXPECT_EQ(again.update(0.9, 1), held);
+    EXPECT_EQ(again.mode(), LoopMode::rest);
+    EXPECT_EQ(c.update(0.9, 1), held);
+    // The one that was restored and the other are the same, also once they leave.
+    for (int k = 0; k < 500; ++k) {
+      const double y = k < 100 ? 0.5 : 1;
+      ASSERT_EQ(again.update(y, 1), c.update(y, 1)) << k;
+      ASSERT_EQ(again.mode(), c.mode()) << k;
+    }
+    // Another curve while it rests: u stays.
+    ASSERT_EQ(c.mode(), LoopMode::rest);
+    const double before = c.output();
+    auto other = mapped_config(b0, 0.25);
+    other.controller.observer.curve = ActuatorCurve<>::dead_zone(2);
+    ASSERT_TRUE(c.retune(other));
+    EXPECT_EQ(c.update(1, 1), before);
+
+    auto packed = Packed<Mapped<>, 2>(Mapped<>::make(mapped_config(b0, 0.25)).value());
+    Mapped<> alone[] = {packed[0], packed[1]};
+    Random random(5);
+    for (int k = 0; k < 1000; ++k) {
+      Pack<double, 2> y;
+      y[0] = 1 + random.uniform(-0.01, 0.01);
+      y[1] = random.uniform(0, 2);
+      const auto u = packed.update(y, Pack<double, 2>(1.0));
+      for (int lane = 0; lane < 2; ++lane) ASSERT_EQ(u[lane], alone[lane].update(y[lane], 1)) << k;
+    }
+    EXPECT_EQ(packed[0].mode(), LoopMode::rest);
+    EXPECT_EQ(packed[1].mode(), LoopMode::running);
+  }
 }
 
 }  // namespace control_resting_test

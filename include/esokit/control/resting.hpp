@@ -65,6 +65,9 @@ requires(detail::can_rest<Controller>()) struct RestingConfig {
 /// controlled: without friction the axis drifts to its edge, is answered there, and overshoots it
 /// by as much again.
 ///
+/// Around MappedInput give a dead zone a softness of a fourth of its width: of a u that jumps from
+/// one side of it to the other, either would be held (examples/actuator).
+///
 /// `to_c` does not write it.
 template <class Controller>
 requires(detail::can_rest<Controller>()) class Resting {
