@@ -1,14 +1,16 @@
 #!/usr/bin/env python3
-"""Interprets the Structured Text that to_structured_text writes (IEC 61131-3, only the subset of
-it that is written, with strict types) and compares it with samples of the C++ object, bit for bit.
+"""Compiles the Structured Text that to_structured_text writes (IEC 61131-3, only the subset of it
+that is written, with strict types) to C, which is not the C that it was translated from, and compares
+it with samples of the C++ object, bit for bit.
 
 usage: structured_text.py BLOCK.st SAMPLES
 SAMPLES: a line of input names, `:`, output names; then a line per call, numbers as hex floats, of
 a struct the name of a function that fills it.
 Prints the number of calls that were compared; the status is 1 at the first difference."""
 import math
+import os
 import re
-import struct
+import subprocess
 import sys
 
 TOKEN = re.compile(
@@ -16,10 +18,12 @@ TOKEN = re.compile(
     r"|(?P<sign>:=|<=|>=|<>|\.\.|[-+*/()<>=;:,\[\].])", re.S)
 FLOATS = {"REAL", "LREAL", "a real number"}
 COUNTS = {"UDINT", "UINT", "a whole number"}
-STARTS = {"BOOL": False, "REAL": 0.0, "LREAL": 0.0, "UINT": 0, "UDINT": 0}
+STARTS = {"BOOL": "false", "REAL": "0", "LREAL": "0", "UINT": "0", "UDINT": "0"}
 BITS = {"UINT": 16, "UDINT": 32}
-MATH = {"ABS": "abs", "SQRT": "root", "EXP": "math.exp", "EXPT": "math.pow", "SIN": "sine",
-        "ATAN": "math.atan"}
+MATH = {"ABS": "fabs", "SQRT": "sqrt", "EXP": "exp", "EXPT": "pow", "SIN": "sin", "ATAN": "atan"}
+# Counts are wide, so that one out of its range is seen.
+IN_C = {"REAL": "float", "LREAL": "double", "a real number": "double", "BOOL": "bool",
+        "UINT": "int64_t", "UDINT": "int64_t", "DWORD": "int64_t", "a whole number": "int64_t"}
 # Of all words of the language those that are likely in what is written.
 KEYWORDS = set("""IF THEN ELSIF ELSE END_IF FOR TO BY DO END_FOR WHILE END_WHILE REPEAT UNTIL EXIT
     CASE OF END_CASE RETURN TRUE FALSE AND OR XOR NOT MOD SEL VAR VAR_INPUT VAR_OUTPUT VAR_IN_OUT
@@ -45,70 +49,56 @@ def tokens(text):
     return found
 
 
-# ---- What the compiled text calls.
+# What the compiled text calls.
+HEAD = """#include <math.h>
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
 
-def rounded(x):
-    """x as REAL."""
-    if math.isnan(x) or math.isinf(x):
-        return x
-    try:
-        return struct.unpack("f", struct.pack("f", x))[0]
-    except OverflowError:
-        return math.copysign(math.inf, x)
+static int64_t counted(int64_t x, int bits)
+{
+  if (x < 0 || x >> bits != 0) {
+    puts("a count out of its range");
+    exit(1);
+  }
+  return x;
+}
+static int64_t counted_real(double x, int bits)
+{
+  return counted(fabs(x) < 1e18 ? (int64_t)x : -1, bits);
+}
+static int64_t placed(int64_t i, int64_t size)
+{
+  if (i < 0 || i >= size) {
+    puts("a place out of range");
+    exit(1);
+  }
+  return i;
+}
+static int64_t calls = 0;
+static int differs(const char *name, const char *its, double mine)
+{
+  const double given = strtod(its, NULL);
+  if (memcmp(&mine, &given, sizeof mine) == 0) {
+    return 0;
+  }
+  printf("call %lld: %s is %a, in C++ %s\\n", (long long)calls, name, mine, its);
+  return 1;
+}
 
-
-def divided(a, b):
-    if b == 0.0:
-        if a == 0.0 or math.isnan(a):
-            return math.nan
-        return math.copysign(math.inf, a) * math.copysign(1.0, b)
-    return a / b
-
-
-def root(x):
-    return math.sqrt(x) if x >= 0.0 else math.nan
-
-
-def sine(x):
-    return math.sin(x) if math.isfinite(x) else math.nan
-
-
-def counted(x, bits):
-    assert 0 <= x < 1 << bits, "a count out of its range"
-    return x
-
-
-class Values:
-    """Variables of a block or a call, or a struct."""
-
-
-class Array(dict):
-    """Numbers by their places."""
-
-    def __setitem__(self, place, number):
-        assert place in self, f"place {place} is out of range"
-        super().__setitem__(place, number)
-
-
-def clone(value):
-    if isinstance(value, Array):
-        return Array((place, clone(one)) for place, one in value.items())
-    if isinstance(value, Values):
-        new = Values()
-        new.__dict__.update((name, clone(one)) for name, one in value.__dict__.items())
-        return new
-    return value
+"""
 
 
 class Text:
-    """Compiles the text to Python: a function each, with its variables in `v`."""
+    """Compiles the text to C: a function each."""
 
     def __init__(self, text):
         self.tokens, self.at = tokens(text), 0
-        self.types, self.functions = {}, {}
-        self.scope = {name: globals()[name] for name in (
-            "math", "clone", "rounded", "divided", "root", "sine", "counted")}
-        self.block = None
+        self.types, self.functions, self.structs, self.arrays = {}, {}, {}, {}
+        self.c = []
+        self.kinds = None  # of the variables of the block
         while self.at < len(self.tokens):
             what = self.next()
             if what == "TYPE":
@@ -154,6 +144,9 @@ class Text:
             while not self.take("END_STRUCT"):
                 self.declaration(fields)
             self.types[name] = fields
+            self.structs[id(fields)] = f"t_{name}"
+            members = [f"  {self.in_c(kind)} v_{one};\n" for one, (kind, _) in fields.items()]
+            self.c.append(f"typedef struct {{\n{''.join(members)}}} t_{name};\n")
         else:
             self.types[name] = self.kind()
         self.expect(";")
@@ -173,6 +166,18 @@ class Text:
         self.expect("OF")
         return (ranges, self.kind())
 
+    def in_c(self, kind):
+        """The name of its type in C."""
+        if isinstance(kind, dict):
+            return self.structs[id(kind)]
+        if not isinstance(kind, tuple):
+            return IN_C[kind]
+        key = (self.in_c(kind[1]), math.prod(len(one) for one in kind[0]))
+        if key not in self.arrays:
+            self.arrays[key] = f"a_{len(self.arrays)}"
+            self.c.append(f"typedef struct {{ {key[0]} at[{key[1]}]; }} {self.arrays[key]};\n")
+        return self.arrays[key]
+
     def declaration(self, into):
         names = [self.name()]
         while self.take(","):
@@ -187,34 +192,25 @@ class Text:
             into[name] = (kind, start)
 
     def start(self, kind):
+        """What a variable begins with, in C."""
         if isinstance(kind, tuple):
-            places = [()]
-            for one in kind[0]:
-                places = [place + (i,) for place in places for i in one]
-            return Array((place, self.start(kind[1])) for place in places)
+            size = math.prod(len(one) for one in kind[0])
+            return "{{" + ", ".join([self.start(kind[1])] * size) + "}}"
         if isinstance(kind, dict):
-            return self.filled(kind)
+            return "{" + ", ".join(start for _, start in kind.values()) + "}"
         return STARTS[kind]
 
-    @staticmethod
-    def filled(fields):
-        new = Values()
-        for name, (_, start) in fields.items():
-            setattr(new, name, clone(start))
-        return new
-
     def initial(self, kind):
-        if isinstance(kind, tuple):
-            all_of_it = self.start(kind)
-            self.expect("[")
-            for place in all_of_it:
-                all_of_it[place] = self.initial(kind[1])
-                if place != list(all_of_it)[-1]:
-                    self.expect(",")
-            self.expect("]")
-            return all_of_it
-        code, its = self.expression()
-        return eval(self.given(code, its, kind), self.scope)  # a literal
+        if not isinstance(kind, tuple):
+            return self.given(*self.expression(), kind)
+        places = []
+        self.expect("[")
+        while not places or self.take(","):
+            places.append(self.initial(kind[1]))
+        self.expect("]")
+        if len(places) != math.prod(len(one) for one in kind[0]):
+            self.fail("initial values of another number")
+        return "{{" + ", ".join(places) + "}}"
 
     def unit(self, what):
         name = self.name()
@@ -235,116 +231,73 @@ class Text:
                 self.names[one] = kind
         if what == "FUNCTION":
             self.names[name] = self.result
-        self.lines = [f"def {name}(v):"]
+        self.lines, self.back = [], f"return v_{name};" if self.result else "return;"
         self.statements(1, ("END_" + what,))
         self.next()
-        self.lines.append("  return")
-        exec("\n".join(self.lines), self.scope)
-        body = self.scope[name]
-        starts = {one: start for one, (_, start) in sections["VAR"].items()}
-        whole = {one: start for one, start in starts.items() if clone(start) is not start}
         if what == "FUNCTION_BLOCK":
-            self.block, self.kinds = body, self.names
-            self.values = Values()
-            for section in sections.values():
-                for one, (_, start) in section.items():
-                    setattr(self.values, one, clone(start))
+            self.kinds = self.names
+            self.c += [f"static {self.in_c(kind)} v_{one} = {start};\n"
+                       for section in sections.values() for one, (kind, start) in section.items()]
+            self.c.append("static void run(void)\n{\n" + "\n".join(self.lines) + "\n}\n")
             return
-        result = self.start(self.result)
-
-        def call(**given):
-            v = Values()
-            v.__dict__.update(starts, **given)
-            for one, start in whole.items():
-                setattr(v, one, clone(start))
-            setattr(v, name, clone(result))
-            body(v)
-            return getattr(v, name)
-        self.functions[name] = (self.result, {
-            one: (kind, one in self.by_reference) for section in ("VAR_INPUT", "VAR_IN_OUT")
-            for one, (kind, _) in sections[section].items()})
-        self.scope["call_" + name] = call
+        parameters = {one: (kind, one in self.by_reference) for section in ("VAR_INPUT", "VAR_IN_OUT")
+                      for one, (kind, _) in sections[section].items()}
+        given = [f"{self.in_c(kind)} {'*' if refers else ''}v_{one}"
+                 for one, (kind, refers) in parameters.items()]
+        own = [f"  {self.in_c(kind)} v_{one} = {start};" for one, (kind, start) in
+               [(name, (self.result, self.start(self.result))), *sections["VAR"].items()]]
+        self.functions[name] = (self.result, parameters)
+        self.c.append(f"static {self.in_c(self.result)} f_{name}({', '.join(given) or 'void'})\n{{\n"
+                      + "\n".join([*own, *self.lines, "  " + self.back]) + "\n}\n")
 
     # ---- Statements.
     def line(self, depth, code):
         self.lines.append("  " * depth + code)
 
     def statements(self, depth, ends):
-        before = len(self.lines)
         while self.peek() not in ends:
             if not self.take(";"):
                 self.statement(depth)
-        if len(self.lines) == before:
-            self.line(depth, "pass")
 
     def condition(self):
-        code, kind = self.expression()
-        return self.given(code, kind, "BOOL")
+        return self.given(*self.expression(), "BOOL")
 
     def statement(self, depth):
         word = self.next()
         if word == "IF":
-            self.line(depth, f"if {self.condition()}:")
+            self.line(depth, f"if ({self.condition()}) {{")
             self.expect("THEN")
             ends = ("ELSIF", "ELSE", "END_IF")
             self.statements(depth + 1, ends)
             while self.take("ELSIF"):
-                self.line(depth, f"elif {self.condition()}:")
+                self.line(depth, f"}} else if ({self.condition()}) {{")
                 self.expect("THEN")
                 self.statements(depth + 1, ends)
             if self.take("ELSE"):
-                self.line(depth, "else:")
+                self.line(depth, "} else {")
                 self.statements(depth + 1, ends)
             self.expect("END_IF")
+            self.line(depth, "}")
         elif word == "WHILE":
-            self.line(depth, f"while {self.condition()}:")
+            self.line(depth, f"while ({self.condition()}) {{")
             self.expect("DO")
             self.statements(depth + 1, ("END_WHILE",))
             self.expect("END_WHILE")
-        elif word == "FOR":
-            name = self.name()
-            self.expect(":=")
-            low = self.given(*self.expression(), self.names[name])
-            self.expect("TO")
-            high = self.given(*self.expression(), self.names[name])
-            self.expect("DO")
-            self.line(depth, f"for v.{name} in range({low}, {high} + 1):")
-            self.statements(depth + 1, ("END_FOR",))
-            self.expect("END_FOR")
-        elif word == "CASE":
-            code, kind = self.expression()
-            self.expect("OF")
-            self.line(depth, f"case = {self.given(code, kind, 'UDINT')}")
-            while not self.take("END_CASE"):
-                self.line(depth, f"if case == {int(self.next())}:")
-                self.expect(":")
-                while self.peek() != "END_CASE" and not self.peek().isdigit():
-                    self.statement(depth + 1)
+            self.line(depth, "}")
         elif word == "RETURN":
-            self.line(depth, "return")
+            self.line(depth, self.back)
         else:
             self.at -= 1
-            obj, key, kind = self.place()
+            place, kind = self.place()
             self.expect(":=")
-            value = self.given(*self.expression(), kind)
-            whole = isinstance(kind, (dict, tuple))
-            if whole:
-                value = f"clone({value})"
-            if not self.is_reference(obj, key):
-                self.line(depth, f"{self.read(obj, key)} = {value}")
-            elif whole:
-                self.line(depth, f"v.{key}.__dict__.update({value}.__dict__)")
-            else:
-                self.line(depth, f"setattr(*v.{key}, {value})")
+            self.line(depth, f"{place} = {self.given(*self.expression(), kind)};")
         self.expect(";")
 
-    # ---- Expressions: Python and its type.
+    # ---- Expressions: C and its type.
     def given(self, code, kind, wanted):
         """The value where one of a type is wanted."""
         if kind == "a real number" and wanted in ("REAL", "LREAL"):
-            if wanted == "LREAL":
-                return code
-            return repr(rounded(float(code))) if "(" not in code else f"rounded({code})"
+            return code if wanted == "LREAL" else f"(float)({code})"
         if kind is wanted or kind == wanted or (kind == "a whole number" and wanted in COUNTS):
             return code
         return self.fail(f"{kind} given where {wanted} is wanted")
@@ -395,11 +348,9 @@ class Text:
             sign = self.next()
             a, b, kind = self.alike(left, operand())
             if kind in FLOATS:
-                code = f"divided({a}, {b})" if sign == "/" else f"({a} {sign} {b})"
-                left = (f"rounded({code})" if kind == "REAL" else code, kind)
+                left = (f"({a} {sign} {b})", kind)
             elif kind in BITS:
-                sign = {"/": "//", "MOD": "%"}.get(sign, sign)
-                left = (f"counted({a} {sign} {b}, {BITS[kind]})", kind)
+                left = (f"counted({a} {'%' if sign == 'MOD' else sign} {b}, {BITS[kind]})", kind)
             else:
                 self.fail(f"{sign} of {kind}")
         return left
@@ -409,9 +360,9 @@ class Text:
             code, kind = self.unary()
             if kind not in FLOATS:
                 self.fail(f"- of {kind}")
-            return (f"-{code}" if kind == "a real number" else f"(-{code})", kind)
+            return f"(-{code})", kind
         if self.take("NOT"):
-            return f"(not {self.given(*self.unary(), 'BOOL')})", "BOOL"
+            return f"(!{self.given(*self.unary(), 'BOOL')})", "BOOL"
         return self.primary()
 
     def primary(self):
@@ -426,42 +377,33 @@ class Text:
                 str(int(token)), "a whole number")
         if token in ("TRUE", "FALSE"):
             self.next()
-            return token.capitalize(), "BOOL"
+            return token.lower(), "BOOL"
         if self.tokens[self.at + 1] == "(":
             return self.call()
-        obj, key, kind = self.place()
-        return self.read(obj, key), kind
+        return self.place()
 
     def place(self):
-        """What holds a value, its key there, and its type."""
+        """A variable or a part of one, and its type."""
         name = self.name()
         if name not in self.names:
             self.fail(f"{name} is not declared")
-        obj, key, kind = "v", name, self.names[name]
+        code, kind = f"(*v_{name})" if name in self.by_reference else f"v_{name}", self.names[name]
         while self.peek() in (".", "["):
             if self.take("."):
-                obj, key = self.read(obj, key), self.name()
-                kind = kind[key][0]
+                key = self.name()
+                code, kind = f"{code}.v_{key}", kind[key][0]
                 continue
             self.next()
-            places = []
-            while not places or self.take(","):
-                places.append(self.given(*self.expression(), "UDINT"))
+            index, dimensions = "0", list(kind[0])
+            while index == "0" or self.take(","):
+                one = dimensions.pop(0)
+                at = self.given(*self.expression(), "UDINT")
+                index = f"({index}) * {len(one)} + placed({at} - {one.start}, {len(one)})"
             self.expect("]")
-            if len(places) != len(kind[0]):
+            if dimensions:
                 self.fail("an index of other dimensions")
-            obj, key, kind = self.read(obj, key), f"[({', '.join(places)},)]", kind[1]
-        return obj, key, kind
-
-    def is_reference(self, obj, key):
-        return obj == "v" and key in self.by_reference
-
-    def read(self, obj, key):
-        if key[0] == "[":
-            return f"{obj}{key}"
-        if self.is_reference(obj, key) and not isinstance(self.names[key], (dict, tuple)):
-            return f"getattr(*v.{key})"
-        return f"{obj}.{key}"
+            code, kind = f"{code}.at[{index}]", kind[1]
+        return code, kind
 
     def call(self):
         name = self.next()
@@ -473,7 +415,8 @@ class Text:
             self.expect(",")
             no, yes, kind = self.alike(no, self.expression())
             self.expect(")")
-            return f"(({no}, {yes})[{condition}])", kind  # both are computed
+            its = self.in_c(kind)  # both are computed
+            return f"({{ const {its} no = {no}, yes = {yes}; {condition} ? yes : no; }})", kind
         if name in MATH:
             code, kind = self.expression()
             while self.take(","):
@@ -483,26 +426,26 @@ class Text:
             if kind not in FLOATS:
                 self.fail(f"{name} of {kind}")
             code = f"{MATH[name]}({code})"
-            return (f"rounded({code})" if kind == "REAL" and name != "ABS" else code), kind
+            return (f"(float){code}" if kind == "REAL" else code), kind
         if "_to_" in name and name not in self.functions:
             of, to = name.upper().split("_TO_")
             code = self.given(*self.expression(), of)
             self.expect(")")
             if of in COUNTS and to in FLOATS:
-                code = f"float({code})" if to == "LREAL" else f"rounded(float({code}))"
+                code = f"({IN_C[to]}){code}"
             elif of in FLOATS and to in COUNTS:
-                code = f"counted(int({code}), {BITS[to]})"
+                code = f"counted_real({code}, {BITS[to]})"
             elif of in COUNTS and to in COUNTS:
                 code = f"counted({code}, {BITS[to]})"
             elif {of, to} == {"REAL", "LREAL"}:
-                code = f"rounded({code})" if to == "REAL" else code
+                code = f"({IN_C[to]}){code}"
             elif {of, to} != {"UDINT", "DWORD"}:
                 self.fail(f"{name} is no function of the subset")
             return code, to
         if name not in self.functions:
             self.fail(f"{name} is no function of the subset, or used before it is declared")
         result, parameters = self.functions[name]
-        given = []
+        given = {}
         while not self.take(")"):
             if self.tokens[self.at + 1] == ":=":
                 one = self.name()
@@ -511,31 +454,37 @@ class Text:
                 one, = parameters
             kind, by_reference = parameters[one]
             if by_reference:
-                obj, key, its = self.place()
-                self.given("", its, kind)
-                if isinstance(kind, (dict, tuple)):
-                    value = self.read(obj, key)
-                elif self.is_reference(obj, key):
-                    value = f"v.{key}"
-                else:
-                    value = f"({obj}, '{key}')"
+                place, its = self.place()
+                given[one] = f"&{self.given(place, its, kind)}"
             else:
-                value = self.given(*self.expression(), kind)
-                if isinstance(kind, (dict, tuple)):
-                    value = f"clone({value})"
-            given.append(f"{one}={value}")
+                given[one] = self.given(*self.expression(), kind)
             self.take(",")
         if len(given) != len(parameters):
             self.fail(f"a call of {name} with {len(given)} arguments")
-        return f"call_{name}({', '.join(given)})", result
+        return f"f_{name}({', '.join(given[one] for one in parameters)})", result
 
-    # ---- The block.
-    def run(self):
-        self.block(self.values)
-
-
-def bits(value):
-    return struct.pack("d", value) if isinstance(value, float) else value
+    # ---- The program.
+    def program(self, inputs, outputs):
+        """C that reads lines of samples, and ends with 1 at the first difference."""
+        lines = ["int main(void)", "{", "  static char line[10000];",
+                 "  while (fgets(line, sizeof line, stdin) != NULL) {", "    const char *its;"]
+        for i, name in enumerate(inputs):
+            kind = self.kinds[name]
+            lines.append(f'    its = strtok({"line" if i == 0 else "NULL"}, " \\n");')
+            if i == 0:
+                lines.append("    if (its == NULL) break;  // an empty line at the end")
+            if isinstance(kind, dict):
+                lines += [f'    if (strcmp(its, "{function}") == 0) f_{function}(&v_{name});'
+                          for function, (_, parameters) in self.functions.items()
+                          if list(parameters.values()) == [(kind, True)]]
+            else:
+                lines.append(f"    v_{name} = {'strtod' if kind in FLOATS else 'atoll'}(its"
+                             f"{', NULL' if kind in FLOATS else ''});")
+        lines.append("    run();")
+        lines += [f'    if (differs("{name}", strtok(NULL, " \\n"), (double)v_{name})) return 1;'
+                  for name in outputs]
+        lines += ["    ++calls;", "  }", '  printf("%lld\\n", (long long)calls);', "  return 0;", "}"]
+        return HEAD + "".join(self.c) + "\n".join(lines) + "\n"
 
 
 def main():
@@ -543,27 +492,15 @@ def main():
         text = Text(file.read())
     with open(sys.argv[2], encoding="utf-8") as file:
         inputs, outputs = (part.split() for part in file.readline().split(":"))
-        calls = 0
-        for line in file:
-            numbers = line.split()
-            for name, number in zip(inputs, numbers):
-                kind = text.kinds[name]
-                if isinstance(kind, dict):
-                    value = getattr(text.values, name)
-                    text.scope["call_" + number](settings=value)
-                elif kind in FLOATS:
-                    value = float.fromhex(number)
-                else:
-                    value = number == "1" if kind == "BOOL" else int(number)
-                setattr(text.values, name, value)
-            text.run()
-            for name, number in zip(outputs, numbers[len(inputs):]):
-                mine = getattr(text.values, name)
-                its = float.fromhex(number) if isinstance(mine, float) else int(number)
-                if bits(mine) != bits(its):
-                    sys.exit(f"call {calls}: {name} is {mine}, in C++ {its}: {line}")
-            calls += 1
-    print(calls)
+        begin = file.tell()
+    program = sys.argv[1] + ".run"
+    with open(program + ".c", "w", encoding="utf-8") as file:
+        file.write(text.program(inputs, outputs))
+    subprocess.run(["gcc", "-std=gnu11", "-O1", "-w", "-ffp-contract=off", "-fwrapv", "-o", program,
+                    program + ".c", "-lm"], check=True)
+    with open(sys.argv[2], encoding="utf-8") as samples:
+        os.lseek(samples.fileno(), begin, os.SEEK_SET)
+        sys.exit(subprocess.run([os.path.abspath(program)], stdin=samples, check=False).returncode)
 
 
 if __name__ == "__main__":

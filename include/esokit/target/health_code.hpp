@@ -11,8 +11,10 @@
 #include <esokit/target/detail/recorded_design.hpp>
 #include <esokit/target/detail/runtime_text.hpp>
 #include <esokit/target/structured_text.hpp>
+#include <initializer_list>
 #include <string>
 #include <type_traits>
+#include <utility>
 
 namespace esokit {
 
@@ -51,65 +53,36 @@ requires std::same_as<S, typename Controller::scalar_type> Expected<CCode, Error
     const CodeOptions& options = {.name = "health"}) {
   static_assert(std::remove_cvref_t<decltype(controller.observer())>::size == Size,
                 "esokit: Size of the monitor must be the number of states of the observer");
-  if (const auto rules = detail::checked_options<S>(options); !rules) return rules.error();
-  const auto new_names = detail::new_names<S>(options, [&](const CodeOptions& as) {
+  const auto ok = detail::checked_names<S>(options, [&](const CodeOptions& as) {
     return detail::text_of(to_c(monitor, controller, as));
   });
-  if (!new_names) return new_names.error();
-  constexpr bool single = sizeof(S) == sizeof(float);
-  detail::RuntimeText text(options.name, single);
-  const auto number = [&](const char* name, S x) {
-    text.constant(name,
-                  detail::ListWriter(detail::c_language, single).number(static_cast<double>(x)));
-  };
-  // The limits of a diagnosis are double, whatever the monitor is.
-  const auto limit = [&](const char* name, double x) {
-    text.constant(name, detail::ListWriter(detail::c_language, false).number(x));
-  };
+  if (!ok) return ok.error();
+  detail::RuntimeText text(options.name, sizeof(S) == sizeof(float));
   const auto settings = detail::RecordAccess::health(monitor, controller);
-  number("SAMPLE_TIME", controller.observer().sample_time());
-  number("WEIGHT", settings.weight);
-  number("RARE_WEIGHT", settings.rare_weight);
-  number("QUICK_WEIGHT", settings.quick_weight);
-  number("HAIR", settings.hair);
-  number("LARGEST_SQUARE", settings.largest_square);
-  number("LARGEST", S(1000) * settings.range);
-  number("POLE", settings.pole);
-  number("SLOW", settings.slow);
-  number("MIDDLE", settings.middle);
-  number("END_OF_RANGE", static_cast<S>(0.9) * settings.range);
-  number("LEAST_AGAINST", settings.least_against);
-  number("RANGE", settings.range);
-  number("LARGE_MOVE", settings.large_move);
-  number("FALLEN", static_cast<S>(0.85));
-  number("SAID", static_cast<S>(-0.3));
-  number("TENTH", S(1) / S(10));
-  number("LEAST_SHARE", static_cast<S>(0.02) * settings.range);
-  number("LEAST_PHI", settings.least);
-  number("STEP", settings.step);
-  number("FORGET", settings.forget);
-  number("INPUT_GAIN", settings.input_gain);
-  number("SIGN_OF_GAIN", settings.input_gain < S(0) ? S(-1) : S(1));
-  number("NOISE", settings.of_noise);
-  number("THRICE_NOISE", S(3) * settings.of_noise);
+  for (const auto& [name, x] : settings.constants) text.number(name, x);
+  // The limits of a diagnosis are double, whatever the monitor is.
+  const detail::ListWriter in_double(detail::c_language, false);
   const HealthLimits limits;
-  limit("FOR_EVIDENCE", limits.evidence);
-  limit("FOR_EVIDENCE_OF_SIGN", limits.evidence_of_sign);
-  limit("FOR_OPPOSED", limits.opposed);
-  limit("FOR_SIGN_RATIO", limits.sign_ratio);
-  limit("FOR_STEADY", limits.steady);
-  limit("FOR_STEADY_RATIO", limits.steady_ratio);
-  limit("RIGHT_SIGN", -limits.sign_ratio);
-  limit("FOR_STANDING", 0.99);
-  limit("FOR_WRONG_SIGN", limits.wrong_sign);
-  limit("FOR_TOO_SMALL", limits.too_small);
-  limit("FOR_RESPONSE", limits.response);
-  limit("FOR_TOO_LARGE", limits.too_large);
-  limit("NEGATIVE", 0);
-  limit("ONCE", 1);
-  limit("A_QUARTER", 4);
-  limit("OFTEN_LIMITED", 0.05);
-  limit("ONE_SIDE", 0.8);
+  for (const auto& [name, x] : std::initializer_list<std::pair<const char*, double>>{
+           {"FOR_EVIDENCE", limits.evidence},
+           {"FOR_EVIDENCE_OF_SIGN", limits.evidence_of_sign},
+           {"FOR_OPPOSED", limits.opposed},
+           {"FOR_SIGN_RATIO", limits.sign_ratio},
+           {"FOR_STEADY", limits.steady},
+           {"FOR_STEADY_RATIO", limits.steady_ratio},
+           {"RIGHT_SIGN", -limits.sign_ratio},
+           {"FOR_STANDING", 0.99},
+           {"FOR_WRONG_SIGN", limits.wrong_sign},
+           {"FOR_TOO_SMALL", limits.too_small},
+           {"FOR_RESPONSE", limits.response},
+           {"FOR_TOO_LARGE", limits.too_large},
+           {"NEGATIVE", 0},
+           {"ONCE", 1},
+           {"A_QUARTER", 4},
+           {"OFTEN_LIMITED", 0.05},
+           {"ONE_SIDE", 0.8}}) {
+    text.constant(name, in_double.number(x));
+  }
   text.count("SIZE", Size);
   text.count("DIVIDER", static_cast<std::size_t>(settings.divider));
   text.replace("DESIGN_MEMORY",

@@ -2,6 +2,7 @@
 /// to_c of a SmoothProfile: the reference of a move as C99.
 #pragma once
 
+#include <array>
 #include <cctype>
 #include <cmath>
 #include <cstddef>
@@ -38,27 +39,17 @@ inline constexpr const char* profile =
 template <int Order, PlainScalar S>
 Expected<CCode, Error<S>> to_c(const SmoothProfile<Order, S>& profile,
                                const CodeOptions& options = {}) {
-  if (const auto rules = detail::checked_options<S>(options); !rules) return rules.error();
-  const auto new_names = detail::new_names<S>(
+  const auto ok = detail::checked_names<S>(
       options, [&](const CodeOptions& as) { return detail::text_of(to_c(profile, as)); });
-  if (!new_names) return new_names.error();
-  constexpr bool single = sizeof(S) == sizeof(float);
-  const auto number = [](S x) {
-    return detail::ListWriter(detail::c_language, single).number(static_cast<double>(x));
-  };
-  const auto listed = [&](const auto& numbers) {
-    std::string row;
-    for (const S& one : numbers) row += (row.empty() ? "    {" : ", ") + number(one);
-    return row + "},\n";
-  };
-  detail::RuntimeText text(options.name, single);
+  if (!ok) return ok.error();
+  detail::RuntimeText text(options.name, sizeof(S) == sizeof(float));
   const auto numbers = detail::RecordAccess::profile(profile);
   for (int i = 1; i <= Order; ++i) {
     const auto row = static_cast<std::size_t>(i - 1);
     const std::string of = std::to_string(i);
     text.feature("ESOKIT_LIMITED_" + of, numbers.limits[row] > S(0));
-    text.constant("ROOT_OF_LIMIT_" + of, number(numbers.roots_of_limits[row]));
-    text.constant("ROOT_OF_PEAK_" + of, number(numbers.roots_of_peaks[row]));
+    text.number("ROOT_OF_LIMIT_" + of, numbers.roots_of_limits[row]);
+    text.number("ROOT_OF_PEAK_" + of, numbers.roots_of_peaks[row]);
   }
   // The polynomial and its derivatives, as smooth_step has them.
   constexpr int degree = 2 * Order + 1;
@@ -67,35 +58,35 @@ Expected<CCode, Error<S>> to_c(const SmoothProfile<Order, S>& profile,
     c[static_cast<std::size_t>(Order + 1 + k)] = static_cast<S>(
         (k % 2 == 0 ? 1 : -1) * binomial(Order + k, k) * binomial(degree, Order - k));
   }
-  std::string polynomials;
+  std::vector<decltype(c)> polynomials;
   for (int i = 0; i <= Order; ++i) {
-    polynomials += listed(c);
+    polynomials.push_back(c);
     for (std::size_t k = 0; k + 1 < c.size(); ++k) c[k] = static_cast<S>(k + 1) * c[k + 1];
     c.back() = S(0);
   }
   SmoothProfile<Order, S> played = profile;
-  std::string vectors;
+  std::vector<std::vector<S>> vectors;
   for (int k = 0; k < options.self_test_samples; ++k) {
     const S target = static_cast<S>((k / 40) % 2 == 0 ? 1.0 : -0.5);
     (void)played.update(target);
     const auto motion = played.motion();
     std::vector<S> sample{target};
     for (int i = 0; i <= Order; ++i) sample.push_back(motion(i));
-    vectors += listed(sample);
+    vectors.push_back(sample);
   }
-  text.count("COUNT", static_cast<std::size_t>(Order) + 1);
-  text.count("TERMS", static_cast<std::size_t>(degree) + 1);
-  text.count("COLUMNS", static_cast<std::size_t>(Order) + 2);
-  text.count("SAMPLES", static_cast<std::size_t>(options.self_test_samples));
+  text.counts({{"COUNT", polynomials.size()},
+               {"TERMS", c.size()},
+               {"COLUMNS", polynomials.size() + 1},
+               {"SAMPLES", vectors.size()}});
   text.constant("ORDER", std::to_string(Order));
-  text.constant("SAMPLE_TIME", number(numbers.sample_time));
-  text.constant("SHORTEST_TIME", number(numbers.shortest_time));
-  text.constant("LONGER", number(numbers.longer));
-  text.constant("MOST_SAMPLES", number(static_cast<S>(1 << 30)));
+  text.number("SAMPLE_TIME", numbers.sample_time);
+  text.number("SHORTEST_TIME", numbers.shortest_time);
+  text.number("LONGER", numbers.longer);
+  text.number("MOST_SAMPLES", static_cast<S>(1 << 30));
   text.replace("DESIGN_ROOTS", Order > 2 ? "sqrt and cbrt" : "sqrt");
   text.lines("DESIGN_ABOUT", options.comment.empty() ? "" : " * " + options.comment + "\n");
-  text.lines("DESIGN_POLYNOMIALS", polynomials);
-  text.lines("DESIGN_VECTORS", vectors);
+  text.lines("DESIGN_POLYNOMIALS", text.writer().rows(polynomials));
+  text.lines("DESIGN_VECTORS", text.writer().rows(vectors));
   return CCode{text.header(detail::runtime::profile_header),
                text.source({detail::runtime::head, detail::runtime::profile}),
                {}};

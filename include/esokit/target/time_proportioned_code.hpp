@@ -2,7 +2,7 @@
 /// to_c of a TimeProportioned: a relay's output as C99.
 #pragma once
 
-#include <cstddef>
+#include <array>
 #include <esokit/control/time_proportioned.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/target/c_code.hpp>
@@ -12,6 +12,7 @@
 #include <esokit/target/detail/runtime_text.hpp>
 #include <esokit/target/structured_text.hpp>
 #include <string>
+#include <vector>
 
 namespace esokit {
 
@@ -33,40 +34,34 @@ inline constexpr const char* proportioned =
 /// @param output as `make` returned it @return error for the options, as for a controller
 template <PlainScalar S>
 Expected<CCode, Error<S>> to_c(const TimeProportioned<S>& output, const CodeOptions& options = {}) {
-  if (const auto rules = detail::checked_options<S>(options); !rules) return rules.error();
-  const auto new_names = detail::new_names<S>(
+  const auto ok = detail::checked_names<S>(
       options, [&](const CodeOptions& as) { return detail::text_of(to_c(output, as)); });
-  if (!new_names) return new_names.error();
-  constexpr bool single = sizeof(S) == sizeof(float);
-  const auto number = [](S x) {
-    return detail::ListWriter(detail::c_language, single).number(static_cast<double>(x));
-  };
+  if (!ok) return ok.error();
   const auto numbers = detail::RecordAccess::proportioned(output);
   const S range = numbers.on - numbers.off;
   TimeProportioned<S> simulated = output;
-  std::string vectors;
+  std::vector<std::array<S, 3>> vectors;
   S u = numbers.off;
   for (int k = 0; k < options.self_test_samples; ++k) {
     if (simulated.begins()) u = numbers.off + range * (S(k % 13) / S(10) - S(1) / S(10));
     const bool is_on = simulated.update(u);
-    vectors += "    {" + number(u) + ", " + number(S(is_on ? 1 : 0)) + ", " +
-               number(simulated.applied()) + "},\n";
+    vectors.push_back({u, S(is_on ? 1 : 0), simulated.applied()});
   }
-  detail::RuntimeText text(options.name, single);
-  text.count("SAMPLES", static_cast<std::size_t>(options.self_test_samples));
+  detail::RuntimeText text(options.name, sizeof(S) == sizeof(float));
+  text.count("SAMPLES", vectors.size());
   text.constant("WINDOW", std::to_string(numbers.window));
   text.constant("SHORTEST", std::to_string(numbers.shortest));
   text.constant("LONGEST", std::to_string(numbers.longest));
   text.constant("LAST_SAMPLE", std::to_string(numbers.window - 1));
   text.constant("BEYOND_LONGEST", std::to_string(numbers.longest + numbers.window));
-  text.constant("OFF_VALUE", number(numbers.off));
-  text.constant("ON_VALUE", number(numbers.on));
-  text.constant("RANGE", number(range));
-  text.constant("LOW", number(range < S(0) ? numbers.on : numbers.off));
-  text.constant("HIGH", number(range < S(0) ? numbers.off : numbers.on));
-  text.constant("SAMPLE_TIME", number(numbers.sample_time));
+  text.number("OFF_VALUE", numbers.off);
+  text.number("ON_VALUE", numbers.on);
+  text.number("RANGE", range);
+  text.number("LOW", range < S(0) ? numbers.on : numbers.off);
+  text.number("HIGH", range < S(0) ? numbers.off : numbers.on);
+  text.number("SAMPLE_TIME", numbers.sample_time);
   text.lines("DESIGN_ABOUT", options.comment.empty() ? "" : " * " + options.comment + "\n");
-  text.lines("DESIGN_VECTORS", vectors);
+  text.lines("DESIGN_VECTORS", text.writer().rows(vectors));
   return CCode{text.header(detail::runtime::proportioned_header),
                text.source({detail::runtime::head, detail::runtime::proportioned}),
                {}};

@@ -35,6 +35,9 @@ class LinearCall {
   }
 
  private:
+  /// Of an operation on what stands before it. @return whether it is linear
+  [[nodiscard]] bool combine(const Instruction& one, LinearForm& form) const;
+
   std::size_t constant_;
 };
 

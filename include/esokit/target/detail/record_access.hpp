@@ -135,8 +135,6 @@ struct RecordAccess {
   template <class Number, class Observer, class Add>
   static void add_phases(bool waits, bool moves, const Add& add) {
     using Numbers = std::vector<Number>;
-    constexpr RunningLaw runs = kind_of<LawOf<Observer>>;
-    constexpr int size = Observer::size;
     add("control_by", "y", true, [](auto& c, const auto& in) {
       if constexpr (observer_traits<Observer>.gates_outliers) {  // asked before, by the text
         const Number u = c.wanted(in[0]);
@@ -172,6 +170,14 @@ struct RecordAccess {
       (void)c.observer_.revise_input(in[0]);
       return Numbers{};
     });
+    add_arms<Number, Observer>(add);
+  }
+  /// Those that prepare the next sample.
+  template <class Number, class Observer, class Add>
+  static void add_arms(const Add& add) {
+    using Numbers = std::vector<Number>;
+    constexpr RunningLaw runs = kind_of<LawOf<Observer>>;
+    constexpr int size = Observer::size;
     add("arm_restart", "", false, [](auto& c, const auto&) {
       using O = std::remove_cvref_t<decltype(c.observer_)>;
       typename O::Preview next{};
@@ -199,14 +205,8 @@ struct RecordAccess {
         return arm<Numbers>(c, Gains{c.observer_.gain_law().gain(Number(0.0))});
       });
     } else {
-      add("arm_by", numbered("k", size * Observer::levels), false, [](auto& c, const auto& in) {
-        Gains gains{};
-        std::size_t next = 0;
-        for (auto& level : gains) {
-          for (Number& k : level) k = in[next++];
-        }
-        return arm<Numbers>(c, gains);
-      });
+      add("arm_by", numbered("k", size * Observer::levels), false,
+          [](auto& c, const auto& in) { return arm<Numbers>(c, gains_from<Observer>(in, 0)); });
     }
     if constexpr (runs == RunningLaw::schedule) {
       add("arm_long", "contraction samples", false, [](auto& c, const auto& in) {
@@ -261,9 +261,23 @@ struct RecordAccess {
   static const auto& limiter(const C& c) noexcept {
     return c.limiter_;
   }
+  /// Of a controller, in one phase or two.
   template <class C>
   static auto& observer_of(C& c) noexcept {
-    return c.observer_;
+    if constexpr (requires { c.loop_; }) {
+      return c.observer();
+    } else {
+      return c.observer_;
+    }
+  }
+  /// Gains of each level, from `in[next]` on.
+  template <class O, class Number>
+  static auto gains_from(const std::vector<Number>& in, std::size_t next) {
+    Array<ScaledGain<O::size, Number>, O::levels> gains{};
+    for (auto& level : gains) {
+      for (Number& k : level) k = in[next++];
+    }
+    return gains;
   }
 
   /// The gain laws of all levels.
@@ -601,35 +615,45 @@ struct RecordAccess {
     return all;
   }
 
-  /// What a monitor computes from its settings alone, and of the controller that it watches.
+  /// The constants of a monitor's C: what it computes from its settings alone, and of the
+  /// controller that it watches.
   template <class M, class C>
-  static auto health(const M& m, const C& c) noexcept {
+  static auto health(const M& m, const C& c) {
     using S = typename M::scalar_type;
-    struct Numbers {
-      S weight, rare_weight, quick_weight, large_move, hair, largest_square, range, pole, slow,
-          middle, least_against, least, step, forget;
-      S input_gain, of_noise;
+    struct {
+      std::vector<std::pair<const char*, S>> constants;
+      S weight;
       int divider;
-    } numbers;
+    } all{{}, m.weight_, m.divider_};
     const S b = c.observer().input_gain();
-    numbers.range = absolute(b) * m.range_;
-    numbers.weight = m.weight_;
-    numbers.rare_weight = m.rare_weight();
-    numbers.quick_weight = m.quick_weight();
-    numbers.large_move = m.large_move * numbers.range;
-    numbers.hair = static_cast<S>(1e-4) * m.range_;
-    numbers.largest_square = m.largest_square();
-    numbers.pole = m.pole_;
-    numbers.slow = m.slow_;
-    numbers.middle = b * m.middle(c.limiter());
-    numbers.least_against = m.larger(static_cast<S>(0.02) * numbers.range, S(3) * m.least_);
-    numbers.least = m.least_;
-    numbers.step = m.step_;
-    numbers.forget = m.forget_;
-    numbers.input_gain = b;
-    numbers.of_noise = m.health_.innovation_of_noise;
-    numbers.divider = m.divider_;
-    return numbers;
+    const S range = absolute(b) * m.range_;
+    const S noise = m.health_.innovation_of_noise;
+    all.constants = {{"SAMPLE_TIME", c.observer().sample_time()},
+                     {"WEIGHT", m.weight_},
+                     {"RARE_WEIGHT", m.rare_weight()},
+                     {"QUICK_WEIGHT", m.quick_weight()},
+                     {"HAIR", static_cast<S>(1e-4) * m.range_},
+                     {"LARGEST_SQUARE", m.largest_square()},
+                     {"LARGEST", S(1000) * range},
+                     {"POLE", m.pole_},
+                     {"SLOW", m.slow_},
+                     {"MIDDLE", b * m.middle(c.limiter())},
+                     {"END_OF_RANGE", static_cast<S>(0.9) * range},
+                     {"LEAST_AGAINST", m.larger(static_cast<S>(0.02) * range, S(3) * m.least_)},
+                     {"RANGE", range},
+                     {"LARGE_MOVE", m.large_move * range},
+                     {"FALLEN", static_cast<S>(0.85)},
+                     {"SAID", static_cast<S>(-0.3)},
+                     {"TENTH", S(1) / S(10)},
+                     {"LEAST_SHARE", static_cast<S>(0.02) * range},
+                     {"LEAST_PHI", m.least_},
+                     {"STEP", m.step_},
+                     {"FORGET", m.forget_},
+                     {"INPUT_GAIN", b},
+                     {"SIGN_OF_GAIN", b < S(0) ? S(-1) : S(1)},
+                     {"NOISE", noise},
+                     {"THRICE_NOISE", S(3) * noise}};
+    return all;
   }
 
   /// What a profile computes from its settings alone.

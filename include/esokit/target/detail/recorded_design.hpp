@@ -48,37 +48,12 @@ template <class V>
   return rules;
 }
 
-/// The observer of a recorded subject, one type for all subjects.
-/// @{
-struct OfController {
-  template <class C>
-  auto& operator()(C& c) const {
-    return c.observer();
-  }
-};
-
-struct OfPredictive {
-  template <class C>
-  auto& operator()(C& c) const {
-    return RecordAccess::observer_of(c);
-  }
-};
-
-struct Itself {
-  template <class O>
-  auto& operator()(O& o) const {
-    return o;
-  }
-};
-
-struct NoName {
-  template <class O, class Number>
-  std::string operator()(const O&, const Number*) const {
-    return {};
-  }
-};
-
-/// @}
+/// The same for a text without recorded calls, and its names. @param write see new_names
+template <class V, class Write>
+[[nodiscard]] Check<V> checked_names(const CodeOptions& options, const Write& write) {
+  if (const auto rules = checked_options<V>(options); !rules) return rules.error();
+  return new_names<V>(options, write);
+}
 
 /// Notes a call. @param arguments their names, with blanks between @return how many there are
 int note_call(RecordedDesign& design, std::string_view name, std::string_view arguments,
@@ -125,13 +100,15 @@ class DesignRecorder {
     recorder_.add(note_call(design, name, arguments, has_output), std::move(call));
   }
 
-  /// Records the calls of the observer, names the numbers. @param of the observer of a recorded
-  /// subject @param name_of gives the name of a number, or ""
-  template <class Of, class NameOf>
-  [[nodiscard]] Check<V> record(const Of& of, const NameOf& name_of) {
+  /// Records the calls of the observer, names the numbers. @param name_of gives the name of a
+  /// number, or ""
+  template <class NameOf>
+  [[nodiscard]] Check<V> record(const NameOf& name_of) {
     // Without one nothing is rejected.
     design.wrap.gated = design.wrap.gated && (design.gate.threshold > 0 || design.law.watches);
-    add_observer(of);
+    add_running_law();
+    add_of_adapters();
+    add_steps();
     const auto closed = recorder_.record();
     if (!closed) return closed.error();
     auto recorded = closed;
@@ -158,7 +135,7 @@ class DesignRecorder {
     }
     auto object = Recorder<Subject>::as_recorded(subject_);
     const auto numbers = numbers_of<Number>(object);
-    auto& core = RecordAccess::core(of(object));
+    auto& core = RecordAccess::core(observer_of(object));
     const Number* first = &core.predicted_measurement();
     using Model = typename Core::PlantModel;
     std::vector<std::pair<const Number*, const char*>> settings;
@@ -170,7 +147,7 @@ class DesignRecorder {
       std::string name = name_of(object, numbers[i]);
       if (numbers[i] == &core.applied_input()) {
         name = "u_applied";
-      } else if (numbers[i] == &of(object).applied_input()) {
+      } else if (numbers[i] == &observer_of(object).applied_input()) {
         name = "u_given";  // without what is known
       }
       if (numbers[i] == &core.innovation()) name = "innovation";
@@ -192,18 +169,33 @@ class DesignRecorder {
     design.numbers = recorded->numbers;
     for (const auto& call : recorded->calls) design.calls.push_back(call[0]);
     if (auto ok = take_angle(); !ok) return ok;
-    return take_gains(RecordAccess::core(of(subject_)));
+    return take_gains(RecordAccess::core(observer_of(subject_)));
   }
 
  private:
-  template <class OfAny>
-  void add_observer(const OfAny& of_any) {
-    using Law = std::remove_cvref_t<decltype(RecordAccess::laws(std::declval<const Core&>())[0])>;
-    constexpr RunningLaw runs = RecordAccess::kind_of<Law>;
-    static constexpr auto all_of = [](auto& c) -> auto& {
-      return RecordAccess::at_rest(OfAny{}(c));
-    };
-    static constexpr auto of = [](auto& c) -> auto& { return RecordAccess::core(all_of(c)); };
+  using Law = std::remove_cvref_t<decltype(RecordAccess::laws(std::declval<const Core&>())[0])>;
+  static constexpr RunningLaw runs = RecordAccess::kind_of<Law>;
+
+  /// The observer of a subject.
+  template <class C>
+  static auto& observer_of(C& c) {
+    if constexpr (std::is_same_v<Subject, Observer>) {
+      return c;
+    } else {
+      return RecordAccess::observer_of(c);
+    }
+  }
+  /// The same for a call that does not move its law; and without what is known.
+  template <class C>
+  static auto& all_of(C& c) {
+    return RecordAccess::at_rest(observer_of(c));
+  }
+  template <class C>
+  static auto& of(C& c) {
+    return RecordAccess::core(all_of(c));
+  }
+
+  void add_running_law() {
     if constexpr (RecordAccess::knows<Observer>) {
       add("drive", "u", true, [](auto& c, const Numbers& in) {
         return Numbers{RecordAccess::driven(all_of(c), in[0])};
@@ -211,14 +203,14 @@ class DesignRecorder {
     }
     design.gain_is_kept = runs == RunningLaw::none && gain_law_traits<Law>.kind == GainKind::preset;
     if constexpr (runs != RunningLaw::none) {
-      using Recorded = std::remove_cvref_t<decltype(RecordAccess::laws(
-          RecordAccess::core(of_any(std::declval<typename Recorder<Subject>::Recorded&>())))[0])>;
+      using Recorded = std::remove_cvref_t<decltype(RecordAccess::laws(RecordAccess::core(
+          observer_of(std::declval<typename Recorder<Subject>::Recorded&>())))[0])>;
       RecordAccess::add_law<Recorded>(
           [&]<class Call>(std::string_view name, std::string_view arguments, const Call&) {
             constexpr bool has_output =
                 !std::is_void_v<std::invoke_result_t<Call, Recorded&, const Numbers&>>;
             add(name, arguments, has_output, [](auto& c, const Numbers& in) {
-              auto& law = RecordAccess::laws(RecordAccess::core(OfAny{}(c)))[0];
+              auto& law = RecordAccess::laws(RecordAccess::core(observer_of(c)))[0];
               if constexpr (has_output) {
                 return Numbers{Call{}(law, in)};
               } else {
@@ -245,6 +237,9 @@ class DesignRecorder {
         });
       }
     }
+  }
+
+  void add_of_adapters() {
     if constexpr (ShiftableOutput<Core>) {
       if (design.wrap.period > 0) {
         add("shift", "offset", false, [](auto& c, const Numbers& in) {
@@ -255,7 +250,7 @@ class DesignRecorder {
     }
     if constexpr (ShiftableLoad<Core>) {
       if (design.measured.on) {
-        const auto column = RecordAccess::load_column(RecordAccess::core(of_any(subject_)));
+        const auto column = RecordAccess::load_column(RecordAccess::core(observer_of(subject_)));
         add_bound("load", "offset", false, [column](auto& c, const Numbers& in) {
           RecordAccess::load(of(c), column, in[0]);
           return Numbers{};
@@ -283,6 +278,9 @@ class DesignRecorder {
         }
       }
     }
+  }
+
+  void add_steps() {
     add("observe", "y u", false, [](auto& c, const Numbers& in) {
       (void)of(c).update(in[0], in[1]);
       return Numbers{};
@@ -291,16 +289,12 @@ class DesignRecorder {
       (void)of(c).predict(in[0]);
       return Numbers{};
     });
-    if constexpr (runs == RunningLaw::none)
+    if constexpr (runs == RunningLaw::none) {
       add("correct_by", "y " + numbered("k", gains), false, [](auto& c, const Numbers& in) {
-        Array<ScaledGain<size, Number>, Observer::levels> given{};
-        std::size_t next = 1;
-        for (auto& level : given) {
-          for (Number& k : level) k = in[next++];
-        }
-        RecordAccess::correct(of(c), in[0], given);
+        RecordAccess::correct(of(c), in[0], RecordAccess::gains_from<Observer>(in, 1));
         return Numbers{};
       });
+    }
     if (!design.gain_is_kept) {
       add("correct_step", "y", false, [](auto& c, const Numbers& in) {
         (void)of(c).correct(in[0]);
@@ -338,9 +332,7 @@ class DesignRecorder {
     design.order = Observer::order;
     design.sample_time = static_cast<double>(observer.sample_time());
     design.input_gain = static_cast<double>(observer.input_gain());
-    if constexpr (RecordAccess::kind_of<
-                      std::remove_cvref_t<decltype(RecordAccess::laws(observer)[0])>> ==
-                  RunningLaw::none) {
+    if constexpr (runs == RunningLaw::none) {
       return take_table(observer);
     }
     return {};
@@ -407,16 +399,20 @@ bool give_measured(Object& object, V w) {
   return count > 0;
 }
 
+/// r, or with its motion.
+template <int inputs, class Beside>
+auto reference(const Beside& beside) {
+  if constexpr (inputs == 1) {
+    return beside(0);
+  } else {
+    return beside;
+  }
+}
+
 /// The self-test of a controller in one phase.
 template <int inputs, class C>
 void take_samples(RecordedDesign& design, C played) {
   using V = typename C::scalar_type;
-  const auto reference = [](const auto& beside) {
-    if constexpr (inputs == 1)
-      return beside(0);
-    else
-      return beside;
-  };
   const double law =
       design.law_gains.empty() ? 0 : std::abs(design.law_gains[0] / design.input_gain);
   take_self_test<V, inputs>(
@@ -429,9 +425,9 @@ void take_samples(RecordedDesign& design, C played) {
         if (given || call == TestCall::starts || call == TestCall::reports) {
           return V(estimate_of(played.observer(), row));
         }
-        if (call != TestCall::misses) return V(played.update(y, reference(beside)));
+        if (call != TestCall::misses) return V(played.update(y, reference<inputs>(beside)));
         for (int left = static_cast<int>(y); left > 0; --left) {
-          (void)played.update_without_measurement(reference(beside));
+          (void)played.update_without_measurement(reference<inputs>(beside));
         }
         return V(played.output());
       },
@@ -442,12 +438,6 @@ void take_samples(RecordedDesign& design, C played) {
 template <int inputs, class C>
 void take_phases(RecordedDesign& design, C played) {
   using V = typename C::scalar_type;
-  const auto next = [](const auto& beside) {
-    if constexpr (inputs == 1)
-      return beside(0);
-    else
-      return beside;
-  };
   const double law = static_cast<double>(played.gains()[0]) / design.input_gain;
   take_self_test<V, inputs>(
       design, std::abs(law),
@@ -464,7 +454,7 @@ void take_phases(RecordedDesign& design, C played) {
           const bool lost = call == TestCall::misses || call == TestCall::loses;
           u = lost ? V(played.control_without_measurement()) : V(played.control(y));
           if (call == TestCall::splits || call == TestCall::loses) (void)played.applied(beside(0));
-          (void)played.prepare(next(beside));
+          (void)played.prepare(reference<inputs>(beside));
         }
         return u;
       },
@@ -524,7 +514,7 @@ template <class Bare, class BareObserver>
     }
     return at == &c.requested() ? "u_asked" : at == &c.limiter().waiting() ? "u_waiting" : "";
   };
-  return maker.record(OfController{}, name_of);
+  return maker.record(name_of);
 }
 
 template <Scalar S>
@@ -591,7 +581,8 @@ Expected<RecordedDesign, Error<typename Observer::scalar_type>> recorded_design(
   Maker maker(bare, options);
   take_adapters(maker.design, observer);
   maker.design.law = RecordAccess::law_numbers(RecordAccess::core(bare));
-  if (auto ok = maker.record(Itself{}, NoName{}); !ok) return ok.error();
+  const auto unnamed = [](const auto&, const auto*) { return std::string(); };
+  if (auto ok = maker.record(unnamed); !ok) return ok.error();
   Observer played = observer;
   take_self_test<V, 1>(
       maker.design, 0,
@@ -637,7 +628,7 @@ Expected<RecordedDesign, Error<typename C::scalar_type>> recorded_design(
   design.upper = static_cast<double>(RecordAccess::limiter(controller).upper());
   take_rate(design, RecordAccess::limiter(controller));
   maker.add("rest_at", "y u", false, [](auto& c, const Numbers& in) {
-    RecordAccess::rest(RecordAccess::at_rest(OfPredictive{}(c)), in, false);
+    RecordAccess::rest(RecordAccess::at_rest(RecordAccess::observer_of(c)), in, false);
     return Numbers{};
   });
   RecordAccess::add_phases<Number, Observer>(
@@ -650,7 +641,7 @@ Expected<RecordedDesign, Error<typename C::scalar_type>> recorded_design(
   const auto name_of = [](const auto& c, const Number* at) -> std::string {
     return at == &c.output() ? "u_last" : "";
   };
-  if (auto ok = maker.record(OfPredictive{}, name_of); !ok) return ok.error();
+  if (auto ok = maker.record(name_of); !ok) return ok.error();
   if (options.moving_reference) {
     take_phases<C::order + 1>(design, controller);
   } else {

@@ -7,7 +7,9 @@
 #include <cstddef>
 #include <esokit/core/detail/compiled.hpp>
 #include <esokit/core/language.hpp>
+#include <esokit/target/detail/list_writer.hpp>
 #include <esokit/target/detail/written_names.hpp>
+#include <initializer_list>
 #include <map>
 #include <set>
 #include <string>
@@ -39,6 +41,9 @@ class RuntimeText {
  public:
   RuntimeText(const std::string& name, bool single);
 
+  /// The writer of its numbers.
+  [[nodiscard]] const ListWriter& writer() const { return writer_; }
+
   void feature(const std::string& name, bool on) {
     if (on) features_.insert(name);
   }
@@ -51,6 +56,22 @@ class RuntimeText {
   void count(const std::string& name, std::size_t value) {
     constant(name, std::to_string(value) + "u");
   }
+  template <class S>
+  void number(const std::string& name, S value) {
+    constant(name, writer_.number(static_cast<double>(value)));
+  }
+  /// @{
+  /// Of several, each with its name.
+  void features(std::initializer_list<std::pair<const char*, bool>> all) {
+    for (const auto& [name, on] : all) feature(name, on);
+  }
+  void counts(std::initializer_list<std::pair<const char*, std::size_t>> all) {
+    for (const auto& [name, value] : all) count(name, value);
+  }
+  void numbers(std::initializer_list<std::pair<const char*, double>> all) {
+    for (const auto& [name, value] : all) number(name, value);
+  }
+  /// @}
 
   /// Whether a condition of an `#if` holds: names with !, joined by &&, these by ||.
   [[nodiscard]] bool has(std::string_view condition) const;
@@ -87,7 +108,7 @@ class RuntimeText {
   [[nodiscard]] std::string named(std::string_view line);
   [[nodiscard]] std::string named_word(const std::string& word) const;
 
-  bool single_;
+  ListWriter writer_;
   bool in_comment_ = false;
   std::string name_;
   std::string upper_{};

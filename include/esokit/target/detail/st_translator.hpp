@@ -2,10 +2,9 @@
 /// The C that esokit writes, function by function as Structured Text.
 #pragma once
 
+#include <deque>
 #include <esokit/core/detail/compiled.hpp>
 #include <esokit/target/detail/list_writer.hpp>
-#include <map>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -27,7 +26,7 @@ class StTranslator {
   /// @param text header and source, one after the other @param name before each function and type
   StTranslator(const std::string& text, const std::string& name);
 
-  [[nodiscard]] bool has(const std::string& name) const { return functions_.count(name) != 0; }
+  [[nodiscard]] bool has(const std::string& name) const { return found(name) != nullptr; }
 
   /// Whatever `body` calls is written, with all that these call.
   void write_for(const std::string& body);
@@ -49,19 +48,22 @@ class StTranslator {
     std::string initial{}, comment{};
   };
   struct Function {
-    std::string type{}, text{};
+    std::string name{}, type{}, text{};
     std::vector<Variable> parameters{};
-    std::set<std::string> calls{};
+    bool is_needed = false;
   };
 
-  void need(const std::string& function);
+  [[nodiscard]] const Function* found(const std::string& name) const {
+    for (const Function& one : functions_) {
+      if (one.name == name) return &one;
+    }
+    return nullptr;
+  }
 
   std::string name_;
   std::string types_{};
-  std::string settings_{};  ///< the statements that give them
-  std::map<std::string, Function> functions_{};
-  std::vector<std::string> order_{};  ///< of their text
-  std::set<std::string> needed_{};
+  std::string settings_{};            ///< the statements that give them
+  std::deque<Function> functions_{};  ///< what is called before what calls it
 };
 
 }  // namespace esokit::detail

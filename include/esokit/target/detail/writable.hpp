@@ -94,29 +94,10 @@ template <class Object>
 struct WithoutAdapter {
   using type = Object;
 };
-template <class Observer, int Capacity>
-struct WithoutAdapter<DelayedInput<Observer, Capacity>> {
-  using type = typename WithoutAdapter<Observer>::type;
-};
 template <class Observer>
-struct WithoutAdapter<OutlierGate<Observer>> {
-  using type = typename WithoutAdapter<Observer>::type;
-};
-template <class Observer>
-struct WithoutAdapter<WrappedOutput<Observer>> {
-  using type = typename WithoutAdapter<Observer>::type;
-};
-template <class Observer>
-struct WithoutAdapter<Guarded<Observer>> {
-  using type = typename WithoutAdapter<Observer>::type;
-};
-template <class Observer, int Points>
-struct WithoutAdapter<MappedInput<Observer, Points>> {
-  using type = typename WithoutAdapter<Observer>::type;
-};
-template <class Observer, int Count, int Delay>
-struct WithoutAdapter<Measured<Observer, Count, Delay>> {
-  using type = typename WithoutAdapter<Observer>::type;
+requires is_adapter<Observer>
+struct WithoutAdapter<Observer> {
+  using type = typename WithoutAdapter<typename Observer::Adapted>::type;
 };
 /// What is known is recorded with the observer.
 template <class Observer, class Model>

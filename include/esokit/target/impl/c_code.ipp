@@ -12,8 +12,10 @@
 #include <esokit/target/detail/recorded_design.hpp>
 #include <esokit/target/detail/recorded_numbers.hpp>
 #include <esokit/target/detail/runtime_text.hpp>
+#include <initializer_list>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace esokit::detail {
@@ -78,9 +80,7 @@ class CDesign {
     writer_.live = design.live;
     writer_.settings = design.settings;
     set_features();
-    set_features_of_adapters();
     set_constants();
-    set_constants_of_adapters();
     if (design.guard.on) set_guard();
     if (design.measured.on) set_measured();
     set_map();
@@ -119,110 +119,96 @@ class CDesign {
   }
 
  private:
-  void number(const char* name, double value) { text_.constant(name, writer_.number(value)); }
-
   void set_features() {
     const RecordedDesign& d = design_;
     const bool gains_stand = d.law.kind == RunningLaw::none;
-    text_.feature("ESOKIT_CONTROLLER", d.is_controller);
-    text_.feature("ESOKIT_PREDICTIVE", d.predictive);
-    text_.feature("ESOKIT_WAITS", d.predictive && d.waits);
-    text_.feature("ESOKIT_ERROR_BASED", d.error_based);
-    text_.feature("ESOKIT_MOVES", d.options.moving_reference);
-    text_.feature("ESOKIT_SAVED", d.options.saves_state);
-    text_.feature("ESOKIT_COMPENSATOR", d.compensates);
-    text_.feature("ESOKIT_SOFTENS", d.softens);
-    text_.feature("ESOKIT_DIVIDED", d.loop.divider > 1);
-    text_.feature("ESOKIT_STAYS_SAFE", d.loop.stays_safe);
-    text_.feature("ESOKIT_HOLDS_SAFE", d.loop.holds_safe);
-    text_.feature("ESOKIT_MONITORED", d.options.watched);
-    text_.feature("ESOKIT_SETTINGS", d.options.settings_in_struct);
-    text_.feature("ESOKIT_TABLE", gains_stand);
-    text_.feature("ESOKIT_RECOVERS", d.recovers);
-    text_.feature("ESOKIT_GAIN_IS_KEPT", gains_stand && d.gain_is_kept);
-    text_.feature("ESOKIT_SCHEDULE", d.law.kind == RunningLaw::schedule);
-    text_.feature("ESOKIT_FILTER", d.law.kind == RunningLaw::filter);
-    text_.feature("ESOKIT_RETURNS", d.law.returns);
-    text_.feature("ESOKIT_WATCHED", d.law.watches);
-  }
-
-  void set_features_of_adapters() {
-    const RecordedDesign& d = design_;
-    text_.feature("ESOKIT_DELAYED", !d.line.empty());
-    text_.feature("ESOKIT_GATED", d.gate.threshold > 0);
-    text_.feature("ESOKIT_WRAPPED", d.wrap.period > 0);
-    text_.feature("ESOKIT_GATED_ANGLE", d.wrap.gated);
-    text_.feature("ESOKIT_LAW_OF_ANGLE", d.is_controller && !d.wrap.angle.empty());
-    text_.feature("ESOKIT_KNOWN", d.known.on);
-    text_.feature("ESOKIT_MAPPED", !d.map.lines.empty());
-    text_.feature("ESOKIT_MEASURED", d.measured.on);
-    text_.feature("ESOKIT_ONE_W", d.measured.paths.size() == 1);
-    text_.feature("ESOKIT_GUARDED", d.guard.on);
-    text_.feature("ESOKIT_BOUNDED", d.guard.bound > 0);
-    text_.feature("ESOKIT_BOUND_OF_U", d.guard.by_input);
-    text_.feature("ESOKIT_LEAKS", d.guard.leak > 0);
+    text_.features({{"ESOKIT_CONTROLLER", d.is_controller},
+                    {"ESOKIT_PREDICTIVE", d.predictive},
+                    {"ESOKIT_WAITS", d.predictive && d.waits},
+                    {"ESOKIT_ERROR_BASED", d.error_based},
+                    {"ESOKIT_MOVES", d.options.moving_reference},
+                    {"ESOKIT_SAVED", d.options.saves_state},
+                    {"ESOKIT_COMPENSATOR", d.compensates},
+                    {"ESOKIT_SOFTENS", d.softens},
+                    {"ESOKIT_DIVIDED", d.loop.divider > 1},
+                    {"ESOKIT_STAYS_SAFE", d.loop.stays_safe},
+                    {"ESOKIT_HOLDS_SAFE", d.loop.holds_safe},
+                    {"ESOKIT_MONITORED", d.options.watched},
+                    {"ESOKIT_SETTINGS", d.options.settings_in_struct},
+                    {"ESOKIT_TABLE", gains_stand},
+                    {"ESOKIT_RECOVERS", d.recovers},
+                    {"ESOKIT_GAIN_IS_KEPT", gains_stand && d.gain_is_kept},
+                    {"ESOKIT_SCHEDULE", d.law.kind == RunningLaw::schedule},
+                    {"ESOKIT_FILTER", d.law.kind == RunningLaw::filter},
+                    {"ESOKIT_RETURNS", d.law.returns},
+                    {"ESOKIT_WATCHED", d.law.watches}});
+    text_.features({{"ESOKIT_DELAYED", !d.line.empty()},
+                    {"ESOKIT_GATED", d.gate.threshold > 0},
+                    {"ESOKIT_WRAPPED", d.wrap.period > 0},
+                    {"ESOKIT_GATED_ANGLE", d.wrap.gated},
+                    {"ESOKIT_LAW_OF_ANGLE", d.is_controller && !d.wrap.angle.empty()},
+                    {"ESOKIT_KNOWN", d.known.on},
+                    {"ESOKIT_MAPPED", !d.map.lines.empty()},
+                    {"ESOKIT_MEASURED", d.measured.on},
+                    {"ESOKIT_ONE_W", d.measured.paths.size() == 1},
+                    {"ESOKIT_GUARDED", d.guard.on},
+                    {"ESOKIT_BOUNDED", d.guard.bound > 0},
+                    {"ESOKIT_BOUND_OF_U", d.guard.by_input},
+                    {"ESOKIT_LEAKS", d.guard.leak > 0}});
   }
 
   void set_constants() {
     const RecordedDesign& d = design_;
-    number("SAMPLE_TIME", d.sample_time);
-    number("LARGEST", d.single ? static_cast<double>((std::numeric_limits<float>::max)())
-                               : (std::numeric_limits<double>::max)());
+    const double largest = d.single ? static_cast<double>((std::numeric_limits<float>::max)())
+                                    : (std::numeric_limits<double>::max)();
     const auto bridged = static_cast<std::size_t>(d.max_gap) + 1;
     const std::size_t rows = d.recovery.empty() ? bridged : d.recovery.size();
-    text_.count("ROWS", rows);
-    text_.count("LAST_ROW", rows - 1);
-    text_.count("MAX_BRIDGED", bridged);
-    text_.count("STATES", static_cast<std::size_t>(d.size));
-    text_.count("ORDER", static_cast<std::size_t>(d.order));
+    const unsigned hold = d.predictive ? d.hold : d.loop.hold_left;
+    text_.feature("ESOKIT_HOLDS_AT_START", hold > 0);
+    text_.numbers({{"SAMPLE_TIME", d.sample_time}, {"LARGEST", largest}});
+    text_.counts({{"ROWS", rows},
+                  {"LAST_ROW", rows - 1},
+                  {"MAX_BRIDGED", bridged},
+                  {"STATES", static_cast<std::size_t>(d.size)},
+                  {"ORDER", static_cast<std::size_t>(d.order)}});
     text_.constant("SAMPLES", std::to_string(d.samples.size()));
     text_.constant("CALLS", std::to_string(d.test_calls.size()));
-    text_.count("CALL_LATER", of_row * static_cast<std::size_t>(d.order));
-    text_.count("DIVIDER", static_cast<std::size_t>(d.loop.divider));
-    text_.count("MISSING_LIMIT", d.loop.missing_limit);
+    text_.counts({{"CALL_LATER", of_row * static_cast<std::size_t>(d.order)},
+                  {"DIVIDER", static_cast<std::size_t>(d.loop.divider)},
+                  {"MISSING_LIMIT", d.loop.missing_limit}});
     text_.constant("DESIGN_NUMBER", hash_.empty() ? "0u" : "0x" + hash_ + "u");
-    text_.count("HOLD_SAMPLES", d.predictive ? d.hold : d.loop.hold_left);
-    const bool holds = d.predictive ? d.hold > 0 : d.loop.hold_left > 0;
-    text_.feature("ESOKIT_HOLDS_AT_START", holds);
-    text_.constant("FIRST_MODE", holds ? "1u" : "0u");
-    text_.constant("FIRST_PHASE", d.loop.elsewhere ? "5u" : "0u");
-    text_.constant("FIRST_ELSEWHERE", d.loop.elsewhere ? "1u" : "0u");
-    number("FIRST_KEPT", d.loop.kept);
-    number("HOLD_INPUT", d.loop.hold_input);
-    number("SAFE_INPUT", d.loop.safe_input);
-    text_.count("LAW_START", d.law.start);
-    text_.count("LEAST_AGE", d.law.least_age);
-    number("DECAY", d.law.decay);
-    number("SHIFT", d.law.shift);
-    number("CONTRACTION", d.law.contraction);
-  }
-
-  void set_constants_of_adapters() {
-    const RecordedDesign& d = design_;
-    text_.count("DELAY", d.line.empty() ? 0 : d.line.size() - 1);
-    text_.count("LENGTH", d.line.size());
-    number("GATE_FACTOR", d.gate.running_factor);
-    number("GATE_THRESHOLD", d.gate.threshold);
+    text_.counts({{"HOLD_SAMPLES", hold},
+                  {"FIRST_MODE", hold > 0 ? 1 : 0},
+                  {"FIRST_PHASE", d.loop.elsewhere ? 5 : 0},
+                  {"FIRST_ELSEWHERE", d.loop.elsewhere ? 1 : 0}});
+    text_.numbers({{"FIRST_KEPT", d.loop.kept},
+                   {"HOLD_INPUT", d.loop.hold_input},
+                   {"SAFE_INPUT", d.loop.safe_input}});
+    text_.counts({{"LAW_START", d.law.start}, {"LEAST_AGE", d.law.least_age}});
+    text_.numbers(
+        {{"DECAY", d.law.decay}, {"SHIFT", d.law.shift}, {"CONTRACTION", d.law.contraction}});
+    text_.counts({{"DELAY", d.line.empty() ? 0 : d.line.size() - 1}, {"LENGTH", d.line.size()}});
+    text_.numbers({{"GATE_FACTOR", d.gate.running_factor}, {"GATE_THRESHOLD", d.gate.threshold}});
     text_.count("GATE_MOST", d.gate.most_in_a_row);
-    number("PERIOD", d.wrap.period);
-    number("PER_PERIOD", d.wrap.inverse_period);
-    number("HALF_PERIOD", d.wrap.period * 0.5);
-    number("QUARTER_PERIOD", d.wrap.period * 0.25);
-    number("MOST_TURNS", d.wrap.most_turns);
+    text_.numbers({{"PERIOD", d.wrap.period},
+                   {"PER_PERIOD", d.wrap.inverse_period},
+                   {"HALF_PERIOD", d.wrap.period * 0.5},
+                   {"QUARTER_PERIOD", d.wrap.period * 0.25},
+                   {"MOST_TURNS", d.wrap.most_turns}});
   }
 
   void set_guard() {
     const GuardNumbers& guard = design_.guard;
-    number("DISTURBANCE_BOUND", guard.bound);
-    number("BOUND_OF_U", guard.bound_as_given);
-    number("INPUT_GAIN", guard.gain);
-    number("PER_INPUT_GAIN", guard.inverse_gain);
-    number("LEAK", guard.leak);
-    text_.count("LEVELS", static_cast<std::size_t>(guard.levels));
-    text_.count("SETTLING", guard.settling_samples);
-    text_.count("RELEASE", guard.release_samples);
-    text_.count("UP_SIDE", guard.gain > 0 ? 1 : 2);
-    text_.count("DOWN_SIDE", guard.gain > 0 ? 2 : 1);
+    text_.numbers({{"DISTURBANCE_BOUND", guard.bound},
+                   {"BOUND_OF_U", guard.bound_as_given},
+                   {"INPUT_GAIN", guard.gain},
+                   {"PER_INPUT_GAIN", guard.inverse_gain},
+                   {"LEAK", guard.leak}});
+    text_.counts({{"LEVELS", static_cast<std::size_t>(guard.levels)},
+                  {"SETTLING", guard.settling_samples},
+                  {"RELEASE", guard.release_samples},
+                  {"UP_SIDE", guard.gain > 0 ? 1 : 2},
+                  {"DOWN_SIDE", guard.gain > 0 ? 2 : 1}});
     const auto found = [&](int level) {
       return "o->z" + std::to_string(design_.order + 1) +
              (level > 0 ? "_level" + std::to_string(level + 1) : std::string());
@@ -254,10 +240,10 @@ class CDesign {
     of_paths("DESIGN_W_REACHED", [&](const auto& path) { return writer_.numbers(path.reached); });
     of_paths("DESIGN_W_LAST",
              [](const auto& path) { return std::to_string(path.memory.size() - 1) + "u"; });
-    text_.count("W_COUNT", measured.paths.size());
-    text_.count("W_LENGTH", most);
-    text_.count("W_MOST_LOST", measured.most_lost);
-    number("FOUR_PER_W", 4.0 * static_cast<double>(measured.paths.size()));
+    text_.counts({{"W_COUNT", measured.paths.size()},
+                  {"W_LENGTH", most},
+                  {"W_MOST_LOST", measured.most_lost}});
+    text_.number("FOUR_PER_W", 4.0 * static_cast<double>(measured.paths.size()));
   }
 
   void set_map() {
@@ -319,11 +305,17 @@ class CDesign {
   void set(const std::string& name, const std::string& value) {
     init_ += "  o->" + name + " = " + value + ";\n";
   }
-  void real(const std::string& name, double value) { set(name, writer_.number(value)); }
-  void count(const std::string& name, std::size_t value) { set(name, std::to_string(value) + "u"); }
+  using Reals = std::initializer_list<std::pair<const char*, double>>;
+  using Counts = std::initializer_list<std::pair<const char*, std::size_t>>;
+  /// @param of what the names are of
+  void set(const std::string& of, Reals reals, Counts counts) {
+    for (const auto& [name, value] : reals) set(of + name, writer_.number(value));
+    for (const auto& [name, value] : counts) set(of + name, std::to_string(value) + "u");
+  }
   void ring(const std::string& name, const std::vector<double>& numbers) {
-    for (std::size_t i = 0; i < numbers.size(); ++i)
-      real(name + "[" + std::to_string(i) + "]", numbers[i]);
+    for (std::size_t i = 0; i < numbers.size(); ++i) {
+      set(name + "[" + std::to_string(i) + "]", writer_.number(numbers[i]));
+    }
   }
 
   /// What adapters and laws remember of the object.
@@ -331,72 +323,57 @@ class CDesign {
     const RecordedDesign& d = design_;
     if (!d.line.empty()) {
       ring("line", d.line);
-      count("newest", d.line.size() - 1);
+      set("", {}, {{"newest", d.line.size() - 1}});
     }
     if (d.gate.threshold > 0) {
-      real("gate_mean", d.gate.mean);
-      count("gate_count", d.gate.count);
-      count("gate_open", d.gate.open ? 1 : 0);
+      set("", {{"gate_mean", d.gate.mean}},
+          {{"gate_count", d.gate.count}, {"gate_open", d.gate.open}});
     }
     for (std::size_t w = 0; w < d.measured.paths.size(); ++w) {
       const MeasuredPathNumbers& path = d.measured.paths[w];
       const std::string of = "w[" + std::to_string(w) + "].";
       ring(of + "memory", path.memory);
-      real(of + "given", 0);
-      real(of + "last", path.last);
-      real(of + "lagged", path.lagged);
-      count(of + "lost", path.lost);
-      count(of + "newest", path.memory.size() - 1);
+      set(of, {{"given", 0}, {"last", path.last}, {"lagged", path.lagged}},
+          {{"lost", path.lost}, {"newest", path.memory.size() - 1}});
     }
-    if (d.measured.on) {
-      real("w_given", d.measured.told);
-      count("w_is_new", 0);
-    }
+    if (d.measured.on) set("", {{"w_given", d.measured.told}}, {{"w_is_new", 0}});
     if (d.law.kind == RunningLaw::schedule) {
-      count("age", d.law.age);
-      count("pending", d.law.pending ? 1 : 0);
-      count("settled", d.law.settled ? 1 : 0);
+      set("", {}, {{"age", d.law.age}, {"pending", d.law.pending}, {"settled", d.law.settled}});
     }
-    if (d.law.kind == RunningLaw::filter) count("since", d.law.since);
-    if (d.wrap.period > 0) set_turns();
-    if (d.guard.on) set_found();
+    if (d.law.kind == RunningLaw::filter) set("", {}, {{"since", d.law.since}});
+    if (d.wrap.period > 0) set_turns("taken.", d.wrap.count);
+    if (d.wrap.period > 0 && d.wrap.gated) {
+      set_turns("seen.", d.wrap.seen);
+      set("seen_", {},
+          {{"at", d.wrap.seen_at},
+           {"steady", d.wrap.seen_steady},
+           {"rejected", d.wrap.seen_rejected}});
+    }
+    if (d.guard.on) set_found(d.guard);
   }
-
-  void set_turns() {
-    const WrapNumbers& wrap = design_.wrap;
-    const auto add = [&](const std::string& of, const TurnNumbers& turns) {
-      real(of + "angle", turns.y);
-      real(of + "turns", turns.turns);
-      real(of + "motion", turns.motion);
-      count(of + "motion_samples", turns.samples);
-      count(of + "gaps", turns.gaps);
-      count(of + "doubts", turns.doubts);
-      count(of + "begun", turns.begun ? 1 : 0);
-    };
-    add("taken.", wrap.count);
-    if (!wrap.gated) return;
-    add("seen.", wrap.seen);
-    count("seen_at", wrap.seen_at);
-    count("seen_steady", wrap.seen_steady);
-    count("seen_rejected", wrap.seen_rejected);
+  void set_turns(const std::string& of, const TurnNumbers& turns) {
+    set(of, {{"angle", turns.y}, {"turns", turns.turns}, {"motion", turns.motion}},
+        {{"motion_samples", turns.samples},
+         {"gaps", turns.gaps},
+         {"doubts", turns.doubts},
+         {"begun", turns.begun}});
   }
-
-  void set_found() {
-    const GuardNumbers& guard = design_.guard;
-    real("trust", guard.trust);
-    real("weight_up", guard.weight_up);
-    real("weight_down", guard.weight_down);
-    real("gain_ratio", guard.gain_ratio);
-    real("given_ratio", guard.given_ratio);
-    real("input_factor", guard.input_factor);
-    count("settling_left", guard.settling_left);
-    count("release_left", guard.release_left);
-    count("pin", guard.pin);
-    count("side", guard.side);
-    count("held", guard.held ? 1 : 0);
-    count("unsettled", guard.unsettled ? 1 : 0);
-    count("frozen", guard.frozen ? 1 : 0);
-    count("gated", guard.gated ? 1 : 0);
+  void set_found(const GuardNumbers& guard) {
+    set("",
+        {{"trust", guard.trust},
+         {"weight_up", guard.weight_up},
+         {"weight_down", guard.weight_down},
+         {"gain_ratio", guard.gain_ratio},
+         {"given_ratio", guard.given_ratio},
+         {"input_factor", guard.input_factor}},
+        {{"settling_left", guard.settling_left},
+         {"release_left", guard.release_left},
+         {"pin", guard.pin},
+         {"side", guard.side},
+         {"held", guard.held},
+         {"unsettled", guard.unsettled},
+         {"frozen", guard.frozen},
+         {"gated", guard.gated}});
   }
 
   void set_words() {

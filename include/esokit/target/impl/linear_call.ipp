@@ -16,104 +16,84 @@ ESOKIT_FUNCTION LinearCall::LinearCall(const RecordedCall& call, const std::vect
                                        const std::vector<double>& given,
                                        const std::vector<bool>& settings)
     : constant_(states + given.size()) {
+  const auto of_argument = [&](std::size_t from, LinearForm& form) {
+    if (from >= values.size()) {
+      const std::size_t argument = from - values.size();
+      const bool is_column = std::isnan(given[argument]);
+      form[is_column ? states + argument : constant_] = is_column ? 1 : given[argument];
+    } else if (state_of[from] >= 0) {
+      form[static_cast<std::size_t>(state_of[from])] = 1;
+    } else {
+      form[constant_] = values[from];
+    }
+  };
   for (const Instruction& one : call.list.instructions) {
     LinearForm form(constant_ + 1, 0.0);
-    bool fine = true;
-    const auto part = [&](int i) -> const LinearForm& { return of[static_cast<std::size_t>(i)]; };
-    const auto number = [&](int i) { return part(i)[constant_]; };
-    const auto constant = [&](int i) { return i < 0 || is_constant(i); };
-    const auto good = [&](int i) { return i < 0 || linear[static_cast<std::size_t>(i)]; };
-    const bool linear_parts =
-        one.operation == Operation::argument || (good(one.a) && good(one.b) && good(one.c));
-    const auto mix = [&](double by_a, double by_b) {
-      for (std::size_t i = 0; i <= constant_; ++i) {
-        form[i] = by_a * part(one.a)[i] + by_b * part(one.b)[i];
-      }
-    };
+    bool is_linear = true, changes = false;
     if (one.operation == Operation::constant) {
       form[constant_] = one.value;
     } else if (one.operation == Operation::argument) {
       const auto from = static_cast<std::size_t>(one.a);
-      if (from >= values.size()) {
-        const std::size_t argument = from - values.size();
-        if (std::isnan(given[argument]))
-          form[states + argument] = 1;
-        else
-          form[constant_] = given[argument];
-      } else if (state_of[from] >= 0) {
-        form[static_cast<std::size_t>(state_of[from])] = 1;
-      } else {
-        form[constant_] = values[from];
-      }
-    } else if (!linear_parts) {
-      fine = false;
+      of_argument(from, form);
+      changes = from < settings.size() && settings[from];
     } else {
-      const bool all = constant(one.a) && constant(one.b) && constant(one.c);
-      switch (one.operation) {
-        case Operation::add:
-          mix(1, 1);
-          break;
-        case Operation::subtract:
-          mix(1, -1);
-          break;
-        case Operation::negate:
-          for (std::size_t i = 0; i <= constant_; ++i) form[i] = -part(one.a)[i];
-          break;
-        case Operation::multiply:
-          fine = constant(one.a) || constant(one.b);
-          if (!fine) break;
-          {
-            const int by = constant(one.a) ? one.a : one.b;
-            const int what = constant(one.a) ? one.b : one.a;
-            for (std::size_t i = 0; i <= constant_; ++i) form[i] = number(by) * part(what)[i];
-          }
-          break;
-        case Operation::divide:
-          fine = constant(one.b);
-          for (std::size_t i = 0; fine && i <= constant_; ++i) {
-            form[i] = part(one.a)[i] / number(one.b);
-          }
-          break;
-        case Operation::less:
-          form[constant_] = number(one.a) < number(one.b);
-          fine = all;
-          break;
-        case Operation::greater:
-          form[constant_] = number(one.a) > number(one.b);
-          fine = all;
-          break;
-        case Operation::at_most:
-          form[constant_] = number(one.a) <= number(one.b);
-          fine = all;
-          break;
-        case Operation::at_least:
-          form[constant_] = number(one.a) >= number(one.b);
-          fine = all;
-          break;
-        case Operation::finite:
-          form[constant_] = 1;
-          fine = all;
-          break;
-        case Operation::choose:
-          fine = constant(one.a);
-          if (fine) form = part(number(one.a) > 0.5 ? one.b : one.c);
-          break;
-        default:
-          fine = false;
-      }
-    }
-    bool changes = false;
-    if (one.operation == Operation::argument) {
-      changes = static_cast<std::size_t>(one.a) < settings.size() &&
-                settings[static_cast<std::size_t>(one.a)];
-    } else if (one.operation != Operation::constant) {
+      is_linear = combine(one, form);
       for (const int i : {one.a, one.b, one.c}) {
         changes = changes || (i >= 0 && varies[static_cast<std::size_t>(i)]);
       }
     }
     of.push_back(form);
-    linear.push_back(fine);
+    linear.push_back(is_linear);
     varies.push_back(changes);
+  }
+}
+
+ESOKIT_FUNCTION bool LinearCall::combine(const Instruction& one, LinearForm& form) const {
+  bool all = true;  // are constants
+  for (const int i : {one.a, one.b, one.c}) {
+    if (i >= 0 && !linear[static_cast<std::size_t>(i)]) return false;
+    all = all && (i < 0 || is_constant(i));
+  }
+  const auto part = [&](int i) -> const LinearForm& { return of[static_cast<std::size_t>(i)]; };
+  const auto each = [&](const auto& of_place) {
+    for (std::size_t i = 0; i <= constant_; ++i) form[i] = of_place(i);
+    return true;
+  };
+  const auto is = [&](bool holds) {
+    form[constant_] = holds;
+    return all;
+  };
+  switch (one.operation) {
+    case Operation::add:
+      return each([&](std::size_t i) { return part(one.a)[i] + part(one.b)[i]; });
+    case Operation::subtract:
+      return each([&](std::size_t i) { return part(one.a)[i] - part(one.b)[i]; });
+    case Operation::negate:
+      return each([&](std::size_t i) { return -part(one.a)[i]; });
+    case Operation::multiply: {
+      const bool by_first = is_constant(one.a);
+      const int by = by_first ? one.a : one.b, what = by_first ? one.b : one.a;
+      return is_constant(by) && each([&](std::size_t i) { return number(by) * part(what)[i]; });
+    }
+    case Operation::divide:
+      return is_constant(one.b) &&
+             each([&](std::size_t i) { return part(one.a)[i] / number(one.b); });
+    case Operation::less:
+      return is(number(one.a) < number(one.b));
+    case Operation::greater:
+      return is(number(one.a) > number(one.b));
+    case Operation::at_most:
+      return is(number(one.a) <= number(one.b));
+    case Operation::at_least:
+      return is(number(one.a) >= number(one.b));
+    case Operation::finite:
+      return is(true);
+    case Operation::choose:
+      if (!is_constant(one.a)) return false;
+      form = part(number(one.a) > 0.5 ? one.b : one.c);
+      return true;
+    default:
+      return false;
   }
 }
 

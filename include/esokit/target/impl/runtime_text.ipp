@@ -12,7 +12,7 @@
 namespace esokit::detail {
 
 ESOKIT_FUNCTION RuntimeText::RuntimeText(const std::string& name, bool single)
-    : single_(single), name_(name) {
+    : writer_(c_language, single), name_(name) {
   upper_ = begin_of_constants(name);
   replace("real", single ? "float" : "double");
   replace("DESIGN_HEADER", "\"" + name + ".h\"");
@@ -31,8 +31,7 @@ ESOKIT_FUNCTION bool RuntimeText::has(std::string_view condition) const {
   if (both != std::string_view::npos) {
     return has(condition.substr(0, both)) && has(condition.substr(both + 4));
   }
-  if (condition[0] == '!') return !has(condition.substr(1));
-  return features_.count(condition) != 0;
+  return condition[0] == '!' ? !has(condition.substr(1)) : features_.count(condition) != 0;
 }
 
 ESOKIT_FUNCTION std::string RuntimeText::header(std::string_view file) {
@@ -128,7 +127,7 @@ ESOKIT_FUNCTION std::string RuntimeText::named(std::string_view line) {
     }
     const std::string word = std::string(line.substr(at, end - at));
     const bool has_point = word.find('.') != std::string::npos;
-    out += is_number ? word + (has_point && single_ ? "f" : "") : named_word(word);
+    out += is_number ? word + (has_point && writer_.single() ? "f" : "") : named_word(word);
     at = end;
   }
   return out;

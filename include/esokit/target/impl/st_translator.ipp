@@ -10,7 +10,7 @@
 #include <map>
 #include <set>
 #include <string>
-#include <utility>
+#include <tuple>
 #include <vector>
 
 namespace esokit::detail {
@@ -22,8 +22,8 @@ class StParser {
 
   void read(const std::string& text) {
     split(text);
-    tokens_.push_back({});
-    while (to_.error.empty() && at_ + 1 < tokens_.size()) item();
+    tokens_.resize(tokens_.size() + 3);  // at_ never goes beyond the first
+    while (at_ + 3 < tokens_.size()) item();
     std::string structs;
     for (const std::string& each : order_of_structs_) {
       structs += "TYPE " + each + " :\n  STRUCT\n";
@@ -48,8 +48,8 @@ class StParser {
     bool lazy = false;          ///< only where C evaluates it: a change, a place, a difference
     bool is_one = true;         ///< needs no brackets
     bool by_reference = false;  ///< of a function with VAR_IN_OUT
-    std::string inside{};       ///< brackets around all of it
-    [[nodiscard]] const std::string& bare() const { return inside.empty() ? text : inside; }
+    bool brackets = false;      ///< around it, where it is an operand
+    [[nodiscard]] std::string operand() const { return brackets ? "(" + text + ")" : text; }
   };
 
   // ---- Tokens.
@@ -109,14 +109,10 @@ class StParser {
     }
   }
 
-  [[nodiscard]] const std::string& peek(std::size_t ahead = 0) const {
-    return tokens_[at_ + ahead < tokens_.size() ? at_ + ahead : tokens_.size() - 1].text;
+  [[nodiscard]] const std::string& peek(int ahead = 0) const {
+    return tokens_[at_ + static_cast<std::size_t>(ahead)].text;
   }
-  std::string next() {
-    const std::string token = peek();
-    if (at_ + 1 < tokens_.size()) ++at_;
-    return token;
-  }
+  const std::string& next() { return tokens_[at_ + 3 < tokens_.size() ? at_++ : at_].text; }
   bool take(const std::string& token) { return peek() == token && !next().empty(); }
   void expect(const std::string& token) {
     if (!take(token)) fail("'" + token + "' expected, not '" + peek() + "'");
@@ -127,8 +123,8 @@ class StParser {
     }
   }
   void fail(const std::string& what) {
-    if (to_.error.empty()) to_.error = what + " in '" + function_name_ + "'";
-    at_ = tokens_.size() - 1;
+    if (to_.error.empty()) to_.error = what + " in '" + function_.name + "'";
+    at_ = tokens_.size() - 3;
   }
 
   // ---- Types and names.
@@ -163,15 +159,13 @@ class StParser {
     return is_word_of_structured_text(word) ? "the_" + word : word;
   }
   std::string declared(const Variable& one) {
-    std::string text = one.type, ranges;
-    for (const int size : one.sizes) {
-      ranges += (ranges.empty() ? "0.." : ", 0..") + std::to_string(size - 1);
-    }
+    std::string text = one.type;
     if (one.sizes.size() == 1 && one.initial.empty() && text == real_) {
       arrays_.insert(one.sizes[0]);
       text = to_.name_ + "_numbers_" + std::to_string(one.sizes[0]);
-    } else if (!ranges.empty()) {
-      text = "ARRAY[" + ranges + "] OF " + text;
+    } else if (!one.sizes.empty()) {
+      const auto range = [](int size) { return "0.." + std::to_string(size - 1); };
+      text = "ARRAY[" + listed(one.sizes, range) + "] OF " + text;
     }
     if (!one.initial.empty()) text += " := [" + one.initial + "]";
     return name_of(one.name) + " : " + text + ";" + (one.comment.empty() ? "" : " " + one.comment);
@@ -188,14 +182,13 @@ class StParser {
   void item() {
     const std::string comment = tokens_[at_].before;
     function_ = {};
-    function_name_.clear();
     locals_.clear();
     if (take("extern")) return skip_behind(";");
     if (take("typedef")) return structure();
     (void)take("static");
     const Variable head = declarator();
     if (peek() == "=") return table(head);
-    function_name_ = of_this(head.name);
+    function_.name = of_this(head.name);
     function_.type = head.type;
     function(comment);
   }
@@ -223,8 +216,8 @@ class StParser {
     }
     expect(";");
     if (structs_.count(one.type) != 0) return settings(one, numbers);
-    for (const std::string& each : numbers) one.initial += (one.initial.empty() ? "" : ", ") + each;
-    const bool is_local = !function_name_.empty() && (locals_.empty() || locals_[0].type != state_);
+    one.initial = listed(numbers, [](const std::string& each) { return each; });
+    const bool is_local = !function_.name.empty() && (locals_.empty() || locals_[0].type != state_);
     (is_local ? locals_ : structs_[state_]).push_back(one);
   }
 
@@ -241,8 +234,7 @@ class StParser {
       }
     }
     set_ = set.name;
-    to_.functions_[to_.name_ + "_set_first"].text = to_.settings("first");
-    to_.order_.push_back(to_.name_ + "_set_first");
+    to_.functions_.push_back({to_.name_ + "_set_first", "", to_.settings("first")});
   }
 
   void function(const std::string& comment) {
@@ -260,22 +252,22 @@ class StParser {
     expect("{");
     lines_.clear();
     temporaries_ = 0;
-    if (function_name_ == of_this("is_finite")) {
+    if (function_.name == of_this("is_finite")) {
       // By its value: the largest LREAL is no number to each compiler.
-      line(function_name_ + " := (ABS(x) * 0.5 < ABS(x)) OR (x = 0.0);");
+      line(function_.name + " := (ABS(x) * 0.5 < ABS(x)) OR (x = 0.0);");
       skip_behind("}");
     } else {
       block();
     }
     function_.text = comment + (comment.empty() ? "" : "\n") + whole_text();
-    if (!to_.functions_.emplace(function_name_, function_).second) fail("a second one");
-    to_.order_.push_back(function_name_);
+    if (to_.has(function_.name)) fail("a second one");
+    to_.functions_.push_back(function_);
   }
 
   /// Of the function at hand.
   std::string whole_text() {
     if (!lines_.empty() && lines_.back() == "  RETURN;") lines_.pop_back();
-    std::string parts[3], text = "FUNCTION " + function_name_ + " : " + function_.type + "\n";
+    std::string parts[3], text = "FUNCTION " + function_.name + " : " + function_.type + "\n";
     for (std::size_t i = 0; i < locals_.size(); ++i) {
       parts[i >= function_.parameters.size() ? 2
             : locals_[i].by_reference        ? 0
@@ -326,10 +318,10 @@ class StParser {
     if (peek() == "while" || peek() == "for") return loop();
     if (peek() == "static" || peek() == "const" || !type(peek()).empty()) return declaration();
     if (take("return")) {
-      if (peek() != ";") assign({function_name_, function_.type}, expression());
+      if (peek() != ";") assign({function_.name, function_.type}, expression());
       line("RETURN;");
     } else {
-      if (take("(")) at_ += 2;  // void)
+      if (take("(")) skip_behind(")");  // void
       if (peek() == "memset") return clear();
       (void)take("*");
       const Value left = postfix();
@@ -345,10 +337,9 @@ class StParser {
   void assign(const Value& left, const Value& value) {
     if (value.type != left.type) fail(left.text + " is a " + left.type + ", not " + value.type);
     if (value.text == set_ && !set_.empty()) {
-      function_.calls.insert(to_.name_ + "_set_first");
       ignore({to_.name_ + "_set_first(settings := " + left.text + ")", "BOOL"});
     } else if (value.text != left.text) {
-      line(left.text + " := " + value.bare() + ";");
+      line(left.text + " := " + value.text + ";");
     }
   }
 
@@ -384,12 +375,12 @@ class StParser {
     const std::size_t before = lines_.size();
     const Value value = expression();
     if (lines_.size() != before) fail("'" + value.text + "' needs a statement before it");
-    return value.bare();
+    return value.text;
   }
 
   void condition(const std::string& begin) {
     expect("(");
-    const std::string holds = begin == "IF " ? expression().bare() : alone();
+    const std::string holds = begin == "IF " ? expression().text : alone();
     expect(")");
     line(begin + holds + " THEN");
     body();
@@ -430,16 +421,14 @@ class StParser {
     expect(":");
     const Value no = expression();
     if (yes.type != no.type || yes.lazy || no.lazy) fail("'" + yes.text + "' or '" + no.text + "'");
-    const std::string choice = no.bare() + ", " + yes.bare();
+    const std::string choice = no.text + ", " + yes.text;
     return {"SEL(" + argument(condition) + ", " + choice + ")", yes.type, condition.lazy};
   }
 
-  struct Operator {
-    int level;  ///< the higher, the nearer its operands; 0, 1: of conditions; 2, 3: of bits
-    const char* text;
-    const char* only;  ///< of which type
-  };
   Value binary(int least) {
+    // Levels: the higher, the nearer the operands; 0, 1: of conditions; 2, 3: of bits. Last: of
+    // which type alone.
+    using Operator = std::tuple<int, const char*, const char*>;
     static const std::map<std::string, Operator> operators{
         {"||", {0, "OR", "BOOL"}},  {"&&", {1, "AND", "BOOL"}}, {"|", {2, "OR", "UDINT"}},
         {"&", {3, "AND", "UDINT"}}, {"==", {4, "=", ""}},       {"!=", {4, "<>", ""}},
@@ -447,7 +436,8 @@ class StParser {
         {">=", {5, ">=", ""}},      {"+", {6, "+", ""}},        {"-", {6, "-", ""}},
         {"*", {7, "*", ""}},        {"/", {7, "/", ""}},        {"%", {7, "MOD", "UDINT"}}};
     Value left = unary();
-    for (auto one = operators.find(peek()); one != operators.end() && one->second.level >= least;
+    for (auto one = operators.find(peek());
+         one != operators.end() && std::get<0>(one->second) >= least;
          one = operators.find(peek())) {
       const auto& [level, word, only] = one->second;
       const bool is_difference = next() == "-" && left.type == "UDINT";
@@ -459,7 +449,7 @@ class StParser {
       const bool is_lazy = left.lazy || right.lazy || is_difference, of_bits = level / 2 == 1;
       left.text = of_bits ? "DWORD_TO_UDINT(UDINT_TO_DWORD(" + argument(left) + ") " + word +
                                 " UDINT_TO_DWORD(" + argument(right) + "))"
-                          : left.text + " " + word + " " + right.text;
+                          : left.operand() + " " + word + " " + right.operand();
       left = {left.text, level < 6 && !of_bits ? "BOOL" : left.type, is_lazy, of_bits};
     }
     return left;
@@ -471,7 +461,7 @@ class StParser {
       (void)next();
       Value of = unary();
       if ((of.type == "BOOL") != negates || of.type == "UDINT") fail("a sign of '" + of.text + "'");
-      return {(negates ? "NOT " : "-") + of.text, of.type, of.lazy, false, of.by_reference};
+      return {(negates ? "NOT " : "-") + of.operand(), of.type, of.lazy, false, of.by_reference};
     }
     if (take("&") || take("*")) return postfix();
     if (peek() == "(" && !type(peek(1)).empty() && peek(2) == ")") {
@@ -496,7 +486,7 @@ class StParser {
         const bool goes_on = value.text.back() == ']';
         value.text =
             goes_on ? value.text.substr(0, value.text.size() - 1) + ", " : value.text + "[";
-        value = {value.text + expression().bare() + "]", value.type, true};
+        value = {value.text + expression().text + "]", value.type, true};
         expect("]");
       } else {
         break;
@@ -510,9 +500,7 @@ class StParser {
     if (word == "(") {
       Value inner = expression();
       expect(")");
-      if (!std::exchange(inner.is_one, true)) {
-        inner.inside = std::exchange(inner.text, "(" + inner.text + ")");
-      }
+      inner.brackets = inner.brackets || !inner.is_one;
       return inner;
     }
     if (word == "true" || word == "false") return {word == "true" ? "TRUE" : "FALSE", "BOOL"};
@@ -533,7 +521,7 @@ class StParser {
   /// In the brackets of another call. A call with VAR_IN_OUT stands before it: not each compiler
   /// takes it inside.
   std::string argument(const Value& value) {
-    if (!value.by_reference) return value.bare();
+    if (!value.by_reference) return value.text;
     const std::string name = "value" + std::to_string(++temporaries_);
     add_local({name, value.type});
     line(name + " := " + value.text + ";");
@@ -551,11 +539,10 @@ class StParser {
     const bool rounds = stem == "round" || stem == "ceil";
     const auto of_c = known.find(stem);
     const std::string name = rounds ? rounding(stem) : of_this(word);
-    const auto own = to_.functions_.find(name);
-    const bool is_own = own != to_.functions_.end();
+    const bool is_own = to_.has(name);
     if (!is_own && of_c == known.end()) return fail("'" + word + "' is not known"), Value{};
-    const StTranslator::Function library{real_, "", {{"", real_}, {"", real_}}, {}};
-    const StTranslator::Function& function = is_own ? own->second : library;
+    const StTranslator::Function library{"", real_, "", {{"", real_}, {"", real_}}};
+    const StTranslator::Function& function = is_own ? *to_.found(name) : library;
     Value value{"", function.type};
     std::size_t i = 0;
     for (; !take(")") && i < function.parameters.size(); ++i) {
@@ -570,7 +557,6 @@ class StParser {
     }
     if (!is_own) return {filled(of_c->second, {{"$x", value.text}}), real_, value.lazy};
     if (i != function.parameters.size() || tokens_[at_ - 1].text != ")") fail("a call of " + word);
-    function_.calls.insert(name);
     value.text = name + "(" + value.text + ")";
     return value;
   }
@@ -581,11 +567,8 @@ class StParser {
   /// @return its name
   std::string rounding(const std::string& stem) {
     const std::string name = to_.name_ + "_" + stem;
-    if (!to_.has(name)) to_.order_.push_back(name);
-    StTranslator::Function& made = to_.functions_[name];
-    made.type = real_;
-    made.parameters = {{"x", real_}};
-    made.text = filled(
+    if (to_.has(name)) return name;
+    const std::string text = filled(
         "FUNCTION $f : $REAL\nVAR_INPUT\n  x : $REAL;\nEND_VAR\nVAR\n  size : $REAL;\n"
         "  whole : $REAL;\nEND_VAR\n"
         "  size := ABS(x);\n  IF NOT (size < $W) THEN\n"
@@ -597,6 +580,7 @@ class StParser {
          {"$REAL", real_},
          {"$W", real_ == "REAL" ? "8388608.0" : "4503599627370496.0"},
          {"$UP", stem == "ceil" ? "whole < size" : "size - whole >= 0.5"}});
+    to_.functions_.push_back({name, real_, text, {{"x", real_}}});
     return name;
   }
   /// An LREAL beyond what a REAL holds, which not each compiler takes: times a power of 2^126.
@@ -608,8 +592,7 @@ class StParser {
       by += up ? " * 8.507059173023462E+37" : " * 1.1754943508222875E-38";
     }
     const std::string text = StTranslator::number(ListWriter(c_language, false).number(value)) + by;
-    if (by.empty()) return {text, "LREAL"};
-    return {"(" + text + ")", "LREAL", false, true, false, text};
+    return {text, "LREAL", false, true, false, !by.empty()};
   }
 
   StTranslator& to_;
@@ -626,7 +609,6 @@ class StParser {
 
   // Of the function at hand.
   StTranslator::Function function_{};
-  std::string function_name_{};
   std::vector<Variable> locals_{};  ///< parameters first
   std::vector<std::string> lines_{};
   std::string indent_ = "  ";
@@ -639,21 +621,16 @@ ESOKIT_FUNCTION StTranslator::StTranslator(const std::string& text, const std::s
 }
 
 ESOKIT_FUNCTION void StTranslator::write_for(const std::string& body) {
-  for (const auto& [name, function] : functions_) {
-    if (body.find(name + "(") != std::string::npos) need(name);
+  for (Function& one : functions_) {
+    if (one.is_needed || body.find(one.name + "(") == std::string::npos) continue;
+    one.is_needed = true;
+    write_for(one.text);
   }
-}
-
-ESOKIT_FUNCTION void StTranslator::need(const std::string& function) {
-  if (!needed_.insert(function).second) return;
-  for (const std::string& other : functions_.at(function).calls) need(other);
 }
 
 ESOKIT_FUNCTION std::string StTranslator::text() const {
   std::string all = types_;
-  for (const std::string& name : order_) {
-    if (needed_.count(name) != 0) all += functions_.at(name).text;
-  }
+  for (const Function& one : functions_) all += one.is_needed ? one.text : "";
   return all;
 }
 

@@ -8,6 +8,7 @@
 #include <esokit/target/detail/st_translator.hpp>
 #include <esokit/target/structured_text.hpp>
 #include <string>
+#include <vector>
 
 namespace esokit {
 
@@ -120,123 +121,165 @@ ESOKIT_FUNCTION StructuredText StBlock::text(const std::string& head) {
   return {filled(head, words_) + translator.text() + block, {}, translator.error};
 }
 
-ESOKIT_FUNCTION StructuredText structured_text(const RecordedDesign& design) {
-  const ListWriter writer(c_language, design.single);
-  const std::string& name = design.options.name;
-  StBlock block(c_code(design), design.options, design.single, "_init");
-  const auto number = [&](double x) { return StTranslator::number(writer.number(x)); };
-  const bool controls = design.is_controller;
-  const auto references = design.references(design.predictive ? "next_r" : "r");
-  block.input("y : $real", "the measurement");
-  block.input("no_y : BOOL", "TRUE: there is none at this sample");
-  if (controls || design.predictive) {
-    for (const std::string& r : references) {
-      block.input(r + " : $real", r != references[0]   ? "its derivative"
-                                  : design.predictive  ? "the reference at the next sample"
-                                  : design.compensates ? "u0 of the controller that is helped"
-                                                       : "the reference");
+/// The block of a controller or an observer.
+class DesignBlock {
+ public:
+  explicit DesignBlock(const RecordedDesign& design)
+      : design_(design),
+        name_(design.options.name),
+        block_(c_code(design), design.options, design.single, "_init"),
+        acts_(design.is_controller || design.predictive),
+        references_(design.references(design.predictive ? "next_r" : "r")) {
+    add_sample();
+    if (design.options.settings_in_struct) add_settings();
+    if (design.guard.on) add_guard();
+    if (acts_) block_.body += st_starts;
+    if (design.measured.on) add_measured();
+    block_.body += design.is_controller ? st_controller
+                   : design.predictive  ? st_predictive
+                                        : st_observer;
+    block_.own("flags : UDINT");
+    add_estimates();
+    if (design.options.watched && design.is_controller) add_watched();
+    block_.body =
+        filled(block_.body,
+               {{"$HOLD", hold()},
+                {"$R", listed(references_, [](const std::string& r) { return r + " := " + r; })}});
+  }
+
+  [[nodiscard]] StructuredText text() {
+    StructuredText all = block_.text(head());
+    if (design_.options.settings_in_struct) {
+      all.settings = block_.translator.settings(design_.options.settings_name);
     }
-    block.input("u_held : $real", "what the actuator held, if starts or reports");
-    block.input("starts : BOOL",
-                "TRUE: takes over a plant at rest at y under u_held, before the sample");
-    block.input("reports : BOOL",
-                "TRUE: the actuator held u_held instead of u, before the sample; a limit of rate "
-                "counts from u");
-    block.output("u : $real", "to be held until the next sample");
-    block.output("start_status : UINT");
-    block.output("report_status : UINT");
-  } else {
-    block.input("u : $real", "what the actuator held since the last sample");
-    block.input("resets : BOOL", "TRUE: restarts at (y, 0, .., 0) instead");
+    return all;
   }
-  if (controls || design.predictive) {
-    const unsigned holds = controls ? design.loop.hold_left : design.hold;
-    block.output(std::string("mode : UINT := ") + (holds > 0 ? "1" : "0"),
-                 "0: the law, 1: the start hold, 2: too many measurements are missing");
+
+ private:
+  [[nodiscard]] std::string number(double x) const {
+    return StTranslator::number(ListWriter(c_language, design_.single).number(x));
   }
-  block.output("status : UINT");
-  if (design.options.settings_in_struct) {
-    block.input("settings : $name_settings", "others, of a design of the same structure");
-    block.input("adopts : BOOL", "TRUE: they count from this sample on");
-    block.output("adopted : BOOL", "FALSE: they are not of this structure, nothing changed");
-    block.body += st_adopt;
-  }
-  const bool guards = design.guard.on;
-  if (guards) {
-    block.input("trust : $real := 1.0", "0 .. 1: how much a correction of the disturbance counts");
-    block.input("pin : UINT",
-                "the actuator is at its limit: 1 upper, 2 lower, 3 by the sign of u; 0 at none");
-    block.input("holds : BOOL",
-                controls ? "TRUE: something else holds the plant under u_held at this sample"
-                         : "TRUE: something else holds the plant");
-    block.output("guard_status : UINT", "2: trust or pin is none, the last one counts");
-    block.body += st_tell_guard;
-    if (block.translator.has(name + "_set_input_gain")) {
-      const std::string gain = number(design.input_gain);
-      block.input("b0 : $real := " + gain);
-      block.own("b0_taken : $real := " + gain);
-      block.body += st_tell_gain;
+
+  /// What is given with a sample, and what comes of it.
+  void add_sample() {
+    block_.input("y : $real", "the measurement");
+    block_.input("no_y : BOOL", "TRUE: there is none at this sample");
+    if (acts_) {
+      for (const std::string& r : references_) {
+        block_.input(r + " : $real", r != references_[0]   ? "its derivative"
+                                     : design_.predictive  ? "the reference at the next sample"
+                                     : design_.compensates ? "u0 of the controller that is helped"
+                                                           : "the reference");
+      }
+      block_.input("u_held : $real", "what the actuator held, if starts or reports");
+      block_.input("starts : BOOL",
+                   "TRUE: takes over a plant at rest at y under u_held, before the sample");
+      block_.input("reports : BOOL",
+                   "TRUE: the actuator held u_held instead of u, before the sample; a limit of "
+                   "rate counts from u");
+      block_.output("u : $real", "to be held until the next sample");
+      block_.output("start_status : UINT");
+      block_.output("report_status : UINT");
+      const unsigned holds = design_.predictive ? design_.hold : design_.loop.hold_left;
+      block_.output(std::string("mode : UINT := ") + (holds > 0 ? "1" : "0"),
+                    "0: the law, 1: the start hold, 2: too many measurements are missing");
+    } else {
+      block_.input("u : $real", "what the actuator held since the last sample");
+      block_.input("resets : BOOL", "TRUE: restarts at (y, 0, .., 0) instead");
     }
-    if (!controls) {
-      block.output("u_to_give : $real", "while it is held");
-    }
+    block_.output("status : UINT");
   }
-  if (controls || design.predictive) block.body += st_starts;
-  if (design.measured.on) {
-    const std::size_t count = design.measured.paths.size();
-    if (count > 1) block.own("w : $name_numbers_" + std::to_string(count));
+
+  void add_settings() {
+    block_.input("settings : $name_settings", "others, of a design of the same structure");
+    block_.input("adopts : BOOL", "TRUE: they count from this sample on");
+    block_.output("adopted : BOOL", "FALSE: they are not of this structure, nothing changed");
+    block_.body += st_adopt;
+  }
+
+  void add_guard() {
+    const bool controls = design_.is_controller;
+    block_.input("trust : $real := 1.0", "0 .. 1: how much a correction of the disturbance counts");
+    block_.input("pin : UINT",
+                 "the actuator is at its limit: 1 upper, 2 lower, 3 by the sign of u; 0 at none");
+    block_.input("holds : BOOL",
+                 controls ? "TRUE: something else holds the plant under u_held at this sample"
+                          : "TRUE: something else holds the plant");
+    block_.output("guard_status : UINT", "2: trust or pin is none, the last one counts");
+    block_.body += st_tell_guard;
+    if (block_.translator.has(name_ + "_set_input_gain")) {
+      const std::string gain = number(design_.input_gain);
+      block_.input("b0 : $real := " + gain);
+      block_.own("b0_taken : $real := " + gain);
+      block_.body += st_tell_gain;
+    }
+    if (!controls) block_.output("u_to_give : $real", "while it is held");
+  }
+
+  void add_measured() {
+    const std::size_t count = design_.measured.paths.size();
+    if (count > 1) block_.own("w : $name_numbers_" + std::to_string(count));
     for (std::size_t i = 0; i < count; ++i) {
       const std::string w = count > 1 ? "w" + std::to_string(i + 1) : "w";
-      block.input(w + " : $real", "a measured disturbance");
-      if (count > 1) block.body += "w[" + std::to_string(i) + "] := " + w + ";\n";
+      block_.input(w + " : $real", "a measured disturbance");
+      if (count > 1) block_.body += "w[" + std::to_string(i) + "] := " + w + ";\n";
     }
-    block.input("no_w : BOOL", "TRUE: there is none at this sample");
-    block.body += st_tell_measured;
+    block_.input("no_w : BOOL", "TRUE: there is none at this sample");
+    block_.body += st_tell_measured;
   }
-  block.body += controls ? st_controller : design.predictive ? st_predictive : st_observer;
-  const std::string hold = std::string("IF holds THEN\n  u := $name_hold(o := o, y := y, ") +
-                           (design.error_based ? "r := r, " : "") + "u := u_held);\nELSIF";
-  block.own("flags : UDINT");
-  for (int row = 0; row < design.size; ++row) {
-    const std::string e = "e" + std::to_string(row);
-    block.output(e + " : $real", row == design.order ? std::string("the disturbance")
-                                 : row < design.order
-                                     ? "y" + std::string(static_cast<std::size_t>(row), '\'')
-                                     : std::string("an estimate"));
-    block.body += e + " := $name_estimate(o := o, row := " + std::to_string(row) + ");\n";
+
+  void add_estimates() {
+    for (int row = 0; row < design_.size; ++row) {
+      const std::string e = "e" + std::to_string(row);
+      block_.output(e + " : $real", row == design_.order ? std::string("the disturbance")
+                                    : row < design_.order
+                                        ? "y" + std::string(static_cast<std::size_t>(row), '\'')
+                                        : std::string("an estimate"));
+      block_.body += e + " := $name_estimate(o := o, row := " + std::to_string(row) + ");\n";
+    }
   }
-  if (design.options.watched && controls) {
-    block.output("innovation : $real", "what a HealthMonitor takes, and the next three");
-    block.output("asked : $real");
-    block.output("applied : $real");
-    block.output("missed : UINT");
-    block.body +=
+
+  void add_watched() {
+    block_.output("innovation : $real", "what a HealthMonitor takes, and the next three");
+    block_.output("asked : $real");
+    block_.output("applied : $real");
+    block_.output("missed : UINT");
+    block_.body +=
         "innovation := o.innovation;\nasked := o.u_asked;\napplied := o.u_applied;\n"
         "missed := UDINT_TO_UINT(o.gap);\n";
   }
-  const bool gates = design.gate.threshold > 0 || design.law.watches;
-  block.body =
-      filled(block.body,
-             {{"$HOLD", !guards    ? (controls ? "IF" : "")
-                        : controls ? hold
-                                   : st_hold_observer},
-              {"$R", listed(references, [](const std::string& r) { return r + " := " + r; })}});
-  StructuredText all = block.text(filled(
-      st_head,
-      {{"$FLAGS", design.wrap.period > 0 ? ",\n   64 y was refused as an outlier, 128 y moved "
-                                           "otherwise than before: its turn is uncertain"
-                  : gates                ? ",\n   64 y was refused as an outlier"
-                                         : ""},
-       {"$OF_R", controls || design.predictive
-                     ? ",\n   256 r was NaN, infinite or too large: u is as it was"
-                     : ""},
-       {"$DESIGN", structure_text(design) + ", design " + design_hash(design)},
-       {"$TIME", number(design.sample_time)},
-       {"$GAIN", number(design.input_gain)}}));
-  if (design.options.settings_in_struct) {
-    all.settings = block.translator.settings(design.options.settings_name);
+
+  /// What comes before a sample where something else may hold the plant.
+  [[nodiscard]] std::string hold() const {
+    if (!design_.guard.on) return design_.is_controller ? "IF" : "";
+    if (!design_.is_controller) return st_hold_observer;
+    return std::string("IF holds THEN\n  u := $name_hold(o := o, y := y, ") +
+           (design_.error_based ? "r := r, " : "") + "u := u_held);\nELSIF";
   }
-  return all;
+
+  [[nodiscard]] std::string head() const {
+    const bool gates = design_.gate.threshold > 0 || design_.law.watches;
+    return filled(
+        st_head,
+        {{"$FLAGS", design_.wrap.period > 0 ? ",\n   64 y was refused as an outlier, 128 y moved "
+                                              "otherwise than before: its turn is uncertain"
+                    : gates                 ? ",\n   64 y was refused as an outlier"
+                                            : ""},
+         {"$OF_R", acts_ ? ",\n   256 r was NaN, infinite or too large: u is as it was" : ""},
+         {"$DESIGN", structure_text(design_) + ", design " + design_hash(design_)},
+         {"$TIME", number(design_.sample_time)},
+         {"$GAIN", number(design_.input_gain)}});
+  }
+
+  const RecordedDesign& design_;
+  const std::string& name_;
+  StBlock block_;
+  bool acts_;  ///< it is not an observer alone
+  std::vector<std::string> references_;
+};
+
+ESOKIT_FUNCTION StructuredText structured_text(const RecordedDesign& design) {
+  return DesignBlock(design).text();
 }
 
 }  // namespace detail
