@@ -41,8 +41,8 @@ END
   echo "}  // namespace esokit"
 }
 
-try() {  # try SOURCE NAME
-  if "$compiler" -std=c++20 -fsyntax-only -Iinclude -Iexamples "-I$(dirname -- "$2")" -isystem "$eigen" "$1" 2>"$work/errors"; then
+try() {  # try SOURCE NAME; the definitions of what is declared are compiled elsewhere
+  if "$compiler" -std=c++20 -fsyntax-only -DESOKIT_COMPILED -Iinclude -Iexamples "-I$(dirname -- "$2")" -isystem "$eigen" "$1" 2>"$work/errors"; then
     passed=$((passed + 1))
   else
     failed=$((failed + 1))
