@@ -604,6 +604,7 @@ table() {  # table SEPARATOR [AWK CONDITION for a row with a measurement]
 
 { echo t,y,u; table ,; } >plain.csv
 reads plain.csv
+near 3 5 plain.csv  # smoothed
 for observer in half-gain reduced cascade algebraic adjustable nonlinear; do
   reads plain.csv --observer "$observer"
 done

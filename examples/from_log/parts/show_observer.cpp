@@ -1,3 +1,8 @@
+#include <algorithm>
+#include <cmath>
+#include <esokit/core/error_text.hpp>
+#include <esokit/identify/smooth.hpp>
+#include <esokit/observer/linear_eso.hpp>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -9,6 +14,44 @@
 namespace from_log {
 
 using namespace esokit::examples;
+
+namespace {
+
+using Smoothed = esokit::Expected<esokit::SmoothedLog, esokit::Error<double>>;
+
+/// The log under the model of the observer, each row known from all others.
+template <int Order>
+Smoothed smoothed(const LogSettings& how, const Input& input) {
+  const auto observer = esokit::LinearEso<Order>::make({.observer_bandwidth = how.bandwidth,
+                                                        .input_gain = how.input_gain,
+                                                        .sample_time = how.sample_time});
+  if (!observer) return observer.error();
+  return esokit::smooth({.time = input.log.time, .u = input.log.u, .y = input.log.y}, *observer);
+}
+
+Smoothed smoothed(const LogSettings& how, const Input& input) {
+  return how.order == 1   ? smoothed<1>(how, input)
+         : how.order == 2 ? smoothed<2>(how, input)
+                          : smoothed<3>(how, input);
+}
+
+std::vector<double> divided(std::vector<double> values, double by) {
+  for (double& value : values) value /= by;
+  return values;
+}
+
+/// What the curve beside dhat is, or why there is none.
+std::string about_smoothed(const Smoothed& found, double input_gain) {
+  if (!found) return "The disturbance was not smoothed: " + esokit::to_text(found.error()) + ".";
+  std::vector<double> deviations = divided(found->deviation, std::abs(input_gain));
+  const auto middle = deviations.begin() + static_cast<std::ptrdiff_t>(deviations.size() / 2);
+  std::nth_element(deviations.begin(), middle, deviations.end());
+  return "dhat lags. The other curve does not: each of its values is from the whole log, before "
+         "and after (esokit::smooth), with a standard deviation of " +
+         number_text(*middle, 3) + " in units of u, if order and b0 are right.";
+}
+
+}  // namespace
 
 std::string stem_of(const Settings& settings) {
   // A name of nothing but dots would be a hidden file.
@@ -31,12 +74,17 @@ std::string show_observer(const Settings& settings, const Input& input) {
   std::vector<double> t = time;
   for (std::size_t k = t.size(); k < input.log.y.size(); ++k)
     t.push_back(static_cast<double>(k) * how.sample_time);
+  const Smoothed smooth = smoothed(how, input);
   std::string text = "t_s";
   for (int r = 0; r < how.order; ++r) text += ",y" + std::string(static_cast<std::size_t>(r), '\'');
-  text += ",d\n";
+  text += smooth ? ",d,d_smoothed,deviation\n" : ",d\n";
   for (std::size_t k = 0; k < t.size(); ++k) {
     text += number_text(t[k], 15);
     for (const auto& column : found.columns) text += ',' + number_text(column[k], 12);
+    if (smooth) {
+      text += ',' + number_text(smooth->disturbance[k], 12) + ',' +
+              number_text(smooth->deviation[k], 4);
+    }
     text += '\n';
   }
   const std::filesystem::path file = esokit::examples::path_of(settings.file);
@@ -63,17 +111,21 @@ std::string show_observer(const Settings& settings, const Input& input) {
       .name("output")
       .line(t, input.log.y, {.name = "y", .color = Color::grey, .width = 1.0})
       .line(t, found.columns[0], {.name = "estimate", .color = Color::blue, .width = 1.1});
-  std::vector<double> load;
-  for (const double d : found.columns[static_cast<std::size_t>(how.order)])
-    load.push_back(d / how.input_gain);
-  figure.panel(1, 0)
-      .x_label("t (s)")
-      .y_label("u, d / b0 (unit of u)")
-      .legend(Legend::above)
-      .name("load")
-      .line(t, input.log.u, {.name = "u", .color = Color::grey, .width = 1.0})
-      .line(t, load, {.name = "dhat / b0", .color = Color::vermillion, .width = 1.1});
+  auto& load =
+      figure.panel(1, 0)
+          .x_label("t (s)")
+          .y_label("u, d / b0 (unit of u)")
+          .legend(Legend::above)
+          .name("load")
+          .line(t, input.log.u, {.name = "u", .color = Color::grey, .width = 1.0})
+          .line(t, divided(found.columns[static_cast<std::size_t>(how.order)], how.input_gain),
+                {.name = "dhat / b0", .color = Color::vermillion, .width = 1.1});
+  if (smooth) {
+    load.line(t, divided(smooth->disturbance, how.input_gain),
+              {.name = "smoothed", .color = Color::blue, .width = 1.1});
+  }
   page.figure(figure);
+  page.text(about_smoothed(smooth, how.input_gain));
   page.text("All estimates are in the file " +
             esokit::examples::path_of(numbers).filename().string() + ".");
   return page.write(settings.out, stem_of(settings));
