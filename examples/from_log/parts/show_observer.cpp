@@ -21,18 +21,18 @@ using Smoothed = esokit::Expected<esokit::SmoothedLog, esokit::Error<double>>;
 
 /// The log under the model of the observer, each row known from all others.
 template <int Order>
-Smoothed smoothed(const LogSettings& how, const Input& input) {
+Smoothed smoothed(const LogSettings& how, const esokit::Log& log) {
   const auto observer = esokit::LinearEso<Order>::make({.observer_bandwidth = how.bandwidth,
                                                         .input_gain = how.input_gain,
                                                         .sample_time = how.sample_time});
   if (!observer) return observer.error();
-  return esokit::smooth({.time = input.log.time, .u = input.log.u, .y = input.log.y}, *observer);
+  return esokit::smooth(log, *observer);
 }
 
-Smoothed smoothed(const LogSettings& how, const Input& input) {
-  return how.order == 1   ? smoothed<1>(how, input)
-         : how.order == 2 ? smoothed<2>(how, input)
-                          : smoothed<3>(how, input);
+Smoothed smoothed(const LogSettings& how, const esokit::Log& log) {
+  return how.order == 1   ? smoothed<1>(how, log)
+         : how.order == 2 ? smoothed<2>(how, log)
+                          : smoothed<3>(how, log);
 }
 
 std::vector<double> divided(std::vector<double> values, double by) {
@@ -74,7 +74,7 @@ std::string show_observer(const Settings& settings, const Input& input) {
   std::vector<double> t = time;
   for (std::size_t k = t.size(); k < input.log.y.size(); ++k)
     t.push_back(static_cast<double>(k) * how.sample_time);
-  const Smoothed smooth = smoothed(how, input);
+  const Smoothed smooth = smoothed(how, {.time = t, .u = input.log.u, .y = input.log.y});
   std::string text = "t_s";
   for (int r = 0; r < how.order; ++r) text += ",y" + std::string(static_cast<std::size_t>(r), '\'');
   text += smooth ? ",d,d_smoothed,deviation\n" : ",d\n";
