@@ -43,6 +43,7 @@ struct Fault {
   double lost = 0;   ///< share of the measurements
   double load = 0;   ///< of half the range of u, after a minute
   LoopFault named = LoopFault::none;
+  LoopFault too = LoopFault::none;  ///< whose advice names it, too
 };
 
 constexpr std::array<Fault, 8> faults{
@@ -51,7 +52,10 @@ constexpr std::array<Fault, 8> faults{
      {.name = "b0 5 times too small", .gain = 5, .named = LoopFault::gain_too_small},
      {.name = "b0 10 times too small", .gain = 10, .named = LoopFault::gain_too_small},
      {.name = "a fifth is lost", .lost = 0.2, .named = LoopFault::measurements_rejected},
-     {.name = "a load above the range", .load = 2.2, .named = LoopFault::saturated},
+     {.name = "a load above the range",
+      .load = 2.2,
+      .named = LoopFault::saturated,
+      .too = LoopFault::wrong_sign},
      {.name = "10 times the noise", .noise = 10, .named = LoopFault::innovation_too_large},
      {.name = "a load of 0.4 of the range",
       .load = 0.8,
@@ -66,7 +70,7 @@ constexpr std::array<const char*, 9> names{
 /// What was named, and after which time the first was, s; -1: never.
 struct Named {
   bool designed = false;
-  double first = -1, expected = -1;
+  double first = -1, expected = -1, advised = -1;
   LoopFault what = LoopFault::none;
 };
 
@@ -88,7 +92,7 @@ Named hour(Controller controller, from_log::Runner::Profile profile, const Settl
   faulty.gain *= fault.gain;
   Machine machine(faulty);
   (void)controller.start(plant.y, plant.u);
-  double u = plant.u, fed = 0;
+  double u = plant.u;
   Named named{.designed = true};
   for (int k = 0; k < 3600; ++k) {
     if (k == 60) machine.set_load(-fault.load * 0.5 * (m.u_max - m.u_min) * plant.gain);
@@ -113,15 +117,15 @@ Named hour(Controller controller, from_log::Runner::Profile profile, const Settl
           } else {
             more = m.pole * motion(1) / m.input_gain.value;
           }
-          (void)controller.applied(u - fed);
           double of_law = 0;
           // The profile of the design has as many derivatives as its law.
           if constexpr (std::is_same_v<std::remove_cv_t<decltype(motion)>,
                                        typename Controller::Reference::All>) {
             of_law = controller.update(y, motion);
           }
-          fed = controller.mode() == esokit::LoopMode::safe ? 0.0 : more;
+          const double fed = controller.mode() == esokit::LoopMode::safe ? 0.0 : more;
           u = std::clamp(of_law + fed, m.u_min, m.u_max);
+          (void)controller.applied(u - fed);
         },
         profile);
     monitor.look(controller);
@@ -131,6 +135,7 @@ Named hour(Controller controller, from_log::Runner::Profile profile, const Settl
       named.what = what;
     }
     if (what != LoopFault::none && what == fault.named && named.expected < 0) named.expected = k;
+    if (what != LoopFault::none && (what == fault.named || what == fault.too)) named.advised = k;
     machine.update(u);
   }
   return named;
@@ -195,7 +200,7 @@ int main(int argc, char** argv) {
       return order == 1 ? hours<1>(own) : hours<2>(own);
     });
     for (std::size_t f = 0; f < faults.size(); ++f) {
-      double plants = 0, alarms = 0, found = 0;
+      double plants = 0, alarms = 0, found = 0, advised = 0;
       std::array<int, names.size()> first{};
       std::vector<double> times;
       for (const All& one : all) {
@@ -203,6 +208,7 @@ int main(int argc, char** argv) {
         plants += 1;
         alarms += one[f].first >= 0 ? 1 : 0;
         found += one[f].expected >= 0 ? 1 : 0;
+        advised += one[f].advised >= 0 ? 1 : 0;
         if (one[f].expected >= 0) times.push_back(one[f].expected);
         ++first[static_cast<std::size_t>(one[f].what)];
       }
@@ -214,6 +220,8 @@ int main(int argc, char** argv) {
         const double percent = 100 / std::max(plants, 1.0);
         report.check(where, "with an alarm (%)", std::nullopt, percent * alarms);
         report.check(where, "named (%)", std::nullopt, percent * found);
+        if (faults[f].too != LoopFault::none)
+          report.check(where, "in the advice (%)", std::nullopt, percent * advised);
       }
       std::string said;
       for (std::size_t i = 1; i < first.size(); ++i) {

@@ -371,6 +371,26 @@ TEST(Health, CountsWhatHappened) {
   EXPECT_GT(monitor.health().saturated, 0.8);
 }
 
+/// Limits behind the law are seen by the u that is said before the monitor looks: of an axis that
+/// does not come loose. What is said later is of the sample before.
+TEST(Health, ALimitBehindTheLawIsOne) {
+  for (const double side : {1.0, -1.0}) {
+    for (const bool in_time : {true, false}) {
+      auto loop = loop_of(20, 10);
+      auto monitor = monitor_of();
+      for (int k = 0; k < 5000; ++k) {
+        const double u = std::clamp(loop.update(0.1, 0.1 + 0.1 * side), -1.0, 1.0);
+        if (in_time) (void)loop.applied(u);
+        monitor.look(loop);
+        (void)loop.applied(u);
+      }
+      EXPECT_LT(std::abs(loop.requested()), 5);  // not its own limits
+      EXPECT_NEAR(monitor.health().side, in_time ? side : 0, 0.1);
+      EXPECT_EQ(diagnose(monitor.health()) == LoopFault::saturated, in_time) << side;
+    }
+  }
+}
+
 /// y' = b u - a y + load, or the same of y'' (order 2), driven by a u that stands at a limit.
 template <int Order, class S>
 LoopFault at_a_limit(double b, double r, double load, double seconds) {

@@ -9,6 +9,7 @@
 #include <esokit/adapter/mapped_input.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
+#include <esokit/control/approach_profile.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/control/predictive_adrc.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
@@ -310,6 +311,78 @@ double loop_play(double y, double target, double *r)
   EXPECT_NEAR(plant.output(), 5.0, 1e-3);
   EXPECT_GT(lag, 0.5);           // 2 (2 / omega_c) of r alone, where it is as fast as it may
   EXPECT_LT(worst, 0.05 * lag);  // what is left is of the start and of sampling
+}
+
+/// A heater of 0 .. 100 %: the law, what the profile adds, and limits behind both; at rest it needs
+/// most of what u leaves.
+TEST(CReference, IsWhatAnApproachGives) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  using C = Adrc<LinearEso<1, float>>;
+  const float T = 0.5f, gain = 0.02f, pole = 0.01f;
+  auto controller =
+      C::make({.observer = {.observer_bandwidth = 0.3f, .input_gain = gain, .sample_time = T},
+               .controller_bandwidth = 0.05f,
+               .limits = {.lower = -100, .upper = 200}})
+          .value();
+  auto profile = ApproachProfile<1, 4, float>::make({.pole = pole,
+                                                     .input_gain = gain,
+                                                     .limits = {.lower = 0, .upper = 100},
+                                                     .dead_time = 4 * T,
+                                                     .bandwidth = 0.05f,
+                                                     .sample_time = T})
+                     .value();
+  ASSERT_TRUE(controller.start(20, 10) == StepStatus::ok && profile.start(20, 10));
+  const Folder folder;
+  const CCode heat = to_c(profile, {.name = "heat"}).value();
+  folder.write("heat.h", heat.header);
+  folder.write("heat.c", heat.source);
+  const Library library(folder,
+                        to_c(controller, {.name = "loop", .moving_reference = true}).value(),
+                        R"(
+#include "heat.c"
+float loop_play(float y, float target);
+float loop_play(float y, float target)
+{
+  static loop_state loop;
+  static heat_state heat;
+  static int begun = 0;
+  float motion[2];
+  float u;
+  if (begun == 0) {
+    loop_init(&loop);
+    (void)loop_start(&loop, 20.0f, 10.0f);
+    (void)heat_start(&heat, 20.0f, 10.0f);
+    begun = 1;
+  }
+  (void)heat_update(&heat, target);
+  heat_motion(&heat, motion);
+  u = loop_update(&loop, y, motion[0], motion[1]) + heat_feed(&heat);
+  u = (u < 0.0f) ? 0.0f : ((u > 100.0f) ? 100.0f : u);
+  (void)loop_applied(&loop, u - heat_feed(&heat));
+  return u;
+}
+)");
+  ASSERT_TRUE(library.loaded());
+  float (*play)(float, float) = nullptr;
+  library.find(play, "loop_play");
+  double y = 20, most = 0, least = 100;
+  for (int k = 0; k < 6000; ++k) {
+    const float target = k < 3000 ? 180.0f : 60.0f;
+    (void)profile.update(target);
+    const float of_law = controller.update(static_cast<float>(y), profile.motion());
+    const float u = std::clamp(of_law + profile.feed(), 0.0f, 100.0f);
+    (void)controller.applied(u - profile.feed());
+    EXPECT_TRUE(equal_bits(u, play(static_cast<float>(y), target))) << "sample " << k;
+    most = (std::max)(most, y);
+    if (k > 3000) least = (std::min)(least, y);
+    y += static_cast<double>(T) * (0.018 * static_cast<double>(u) - 0.009 * y);
+    if (k == 2999) {
+      EXPECT_NEAR(y, 180, 0.1);
+    }
+  }
+  EXPECT_NEAR(y, 60, 0.1);
+  EXPECT_LT(most, 181);
+  EXPECT_GT(least, 59);
 }
 
 /// A ramp of 2 a second does not lag.

@@ -1,5 +1,6 @@
 // The C of a monitor, fed by the C of its controller, equals the C++ of both bit for bit: on a
 // sound loop, with a b0 of the wrong sign or several times too small, and with bad measurements.
+#include <algorithm>
 #include <array>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/control/health.hpp>
@@ -62,10 +63,11 @@ struct Found {
 
 /// @param plant_gain over b0 @param stands share of the time for which the sensor stands still
 /// @param loses whether some samples in a row are missing @param load amplitude of a sine in y^(n)
-/// @return how often which fault was named
+/// @param within what goes out of u, if less than 1 @return how often which fault was named
 template <class C>
 std::array<int, 9> watches(double plant_gain, double bad, std::uint64_t seed, double stands = 0,
-                           bool loses = false, double load = 1, double gain = 8) {
+                           bool loses = false, double load = 1, double gain = 8,
+                           double within = 1) {
   SCOPED_TRACE(testing::internal::GetTypeName<C>());
   using V = typename C::scalar_type;
   std::array<int, 9> named{};
@@ -91,11 +93,13 @@ std::array<int, 9> watches(double plant_gain, double bad, std::uint64_t seed, do
   void (*init)(void*, void*) = nullptr;
   V (*update)(void*, V, V) = nullptr;
   V (*miss)(void*, V) = nullptr;
+  unsigned (*applied)(void*, V) = nullptr;
   void (*look)(const void*, void*, double) = nullptr;
   unsigned (*diagnoses)(const void*) = nullptr;
   library.find(init, "both_init");
   library.find(update, "loop_update");
   library.find(miss, "loop_update_without_measurement");
+  library.find(applied, "loop_applied");
   library.find(look, "both_look");
   library.find(diagnoses, "health_diagnose");
   init(loop.data(), its.data());
@@ -103,9 +107,10 @@ std::array<int, 9> watches(double plant_gain, double bad, std::uint64_t seed, do
   Random random(seed);
   V r(1);
   int lost = 0;
+  V u = mine.output();
   for (int k = 0; k < 20000; ++k) {
     plant.set_disturbance(load * std::sin(0.01 * k));
-    plant.step(static_cast<double>(mine.output()));
+    plant.step(static_cast<double>(u));
     if (k % 3000 == 0) plant.set_state(std::vector<double>(C::order, 0.0));
     if (random.index(60) == 0) r = static_cast<V>(random.uniform(-1, 1));
     V y = static_cast<V>(plant.output() + 1e-3 * random.uniform(-1, 1));
@@ -120,6 +125,12 @@ std::array<int, 9> watches(double plant_gain, double bad, std::uint64_t seed, do
     } else {
       (void)mine.update(y, r);
       (void)update(loop.data(), y, r);
+    }
+    u = mine.output();
+    if (within < 1) {  // something behind the law limits u
+      u = std::clamp(u, static_cast<V>(-within), static_cast<V>(within));
+      EXPECT_EQ(mine.applied(u), StepStatus::ok);
+      (void)applied(loop.data(), u);
     }
     // Every other run without a watched sensor.
     if (seed % 2 == 1) {
@@ -173,6 +184,7 @@ TEST(HealthCode, EqualsTheMonitor) {
   (void)watches<Adrc<OutlierGate<LinearEso<2, double>>>>(1, 0.05, 10, 0, true);
   often(watches<C>(1, 0, 6, 0.8), LoopFault::sensor_still);
   often(watches<Small>(-1, 0.01, 8, 0.3), LoopFault::wrong_sign);
+  often(watches<C>(1, 0, 14, 0, false, 4, 8, 0.1), LoopFault::saturated);
   // Half of b0, with the wrong sign and loads that help back: where sign_ratio becomes clear.
   for (const double load : {12, 15}) (void)watches<Small>(-0.5, 0, 12, 0, false, load);
 }

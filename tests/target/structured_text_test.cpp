@@ -491,6 +491,52 @@ TEST(StructuredText, OfProfiles) {
   moves_in_text<3, double>(721);
 }
 
+template <int Order, int Capacity, class V>
+void approaches_in_text(double gain, std::uint64_t seed) {
+  SCOPED_TRACE(Order);
+  auto profile =
+      ApproachProfile<Order, Capacity, V>::make({.pole = V(0.1),
+                                                 .lag = Order == 2 ? V(0.2) : V(0),
+                                                 .input_gain = static_cast<V>(gain),
+                                                 .limits = {.lower = V(-10), .upper = V(20)},
+                                                 .dead_time = V(0.03125) * V(Capacity),
+                                                 .bandwidth = V(1.5),
+                                                 .sample_time = V(0.03125)})
+          .value();
+  const auto block = to_structured_text(profile, {.name = "profile"}).value();
+  Samples samples(std::string("target y u_held starts : started good feed r r1") +
+                  (Order == 2 ? " r2" : ""));
+  Random random(seed + asked("ESOKIT_WRITTEN_SEED", 0));
+  V target(1);
+  int begun = 0, refused = 0;
+  for (int k = 0; k < 4 * samples_each; ++k) {
+    if (random.index(60) == 0) target = static_cast<V>(random.uniform(-20, 20));
+    const V given = odd(random, target);
+    const bool starts = random.index(100) == 0;
+    const V y = odd(random, static_cast<V>(random.uniform(-20, 20)));
+    const V u = odd(random, static_cast<V>(random.uniform(-10, 20)));
+    const bool started = starts && profile.start(y, u);
+    const bool good = profile.update(given);
+    const auto motion = profile.motion();
+    samples.number(given).number(y).number(u).count(starts).count(started).count(good);
+    samples.number(profile.feed());
+    for (int i = 0; i <= Order; ++i) samples.number(motion(i));
+    samples.word("\n");
+    begun += started;
+    refused += !good;
+  }
+  EXPECT_GT(begun, 0);
+  EXPECT_GT(refused, 0);
+  interprets(block, samples);
+}
+
+TEST(StructuredText, OfApproaches) {
+  if (!there("python3")) GTEST_SKIP() << "no python3";
+  approaches_in_text<1, 0, float>(2, 741);
+  approaches_in_text<1, 3, double>(-0.5, 751);
+  approaches_in_text<2, 4, float>(0.3, 761);
+}
+
 template <class V>
 void switches_in_text(double on, std::uint64_t seed) {
   auto output = TimeProportioned<V>::make({.off = V(1),

@@ -183,6 +183,16 @@ TEST(WrittenNames, NoVariableIsAWordOfStructuredText) {
       to_structured_text(SmoothProfile<3>::make({.limits = {1, 1, 1}, .sample_time = 1e-2}).value(),
                          named("motor"))
           .value());
+  texts.push_back(to_structured_text(ApproachProfile<2, 4>::make({.pole = 0.1,
+                                                                  .lag = 1,
+                                                                  .input_gain = 2,
+                                                                  .limits = {-1, 1},
+                                                                  .dead_time = 0.02,
+                                                                  .bandwidth = 1,
+                                                                  .sample_time = 1e-2})
+                                         .value(),
+                                     named("motor"))
+                      .value());
   texts.push_back(to_structured_text(
                       TimeProportioned<>::make({.on = 1, .window = 1, .sample_time = 1e-2}).value(),
                       named("motor"))

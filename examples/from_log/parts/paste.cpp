@@ -552,28 +552,34 @@ Pasting Pasting::make(const Settings& settings, const Input& input, const Findin
   return p;
 }
 
-Runner::Profile Runner::profile_of(const Pasting& p, const TuneModel& model, int gains) {
-  const double T = model.sample_time;
+template <class S>
+Runner::ProfileOf<S> Runner::profile_of(const Pasting& p, const TuneModel& model, int gains) {
+  const auto as = [](double x) { return static_cast<S>(x); };
+  const S T = as(model.sample_time);
   if (p.order == 1) {
-    return esokit::detail::with_number<1, 2>(gains, [&](auto order) -> Profile {
-      return esokit::ApproachProfile<order(), most_delay>::make(
-                 {.pole = p.pole,
-                  .lag = order() == 2 ? model.lag : 0.0,
-                  .input_gain = p.input_gain,
-                  .limits = {.lower = model.u_min, .upper = model.u_max},
-                  .dead_time = p.dead_time,
-                  .bandwidth = p.approach(model, gains),
+    return esokit::detail::with_number<1, 2>(gains, [&](auto order) -> ProfileOf<S> {
+      return esokit::ApproachProfile<order(), most_delay, S>::make(
+                 {.pole = as(p.pole),
+                  .lag = as(order() == 2 ? model.lag : 0.0),
+                  .input_gain = as(p.input_gain),
+                  .limits = {.lower = as(model.u_min), .upper = as(model.u_max)},
+                  .dead_time = as(p.dead_time),
+                  .bandwidth = as(p.approach(model, gains)),
                   .sample_time = T})
           .value();
     });
   }
-  return esokit::detail::with_number<2, 4>(gains, [&](auto order) -> Profile {
-    esokit::SmoothProfileConfig<order()> config{.shortest_time = p.shortest, .sample_time = T};
+  return esokit::detail::with_number<2, 4>(gains, [&](auto order) -> ProfileOf<S> {
+    esokit::SmoothProfileConfig<order(), S> config{.shortest_time = as(p.shortest),
+                                                   .sample_time = T};
     const auto limits = p.limits(model, static_cast<std::size_t>(gains));
-    std::copy(limits.begin(), limits.end(), config.limits.begin());
-    return esokit::SmoothProfile<order()>::make(config).value();
+    std::transform(limits.begin(), limits.end(), config.limits.begin(), as);
+    return esokit::SmoothProfile<order(), S>::make(config).value();
   });
 }
+template Runner::ProfileOf<double> Runner::profile_of<double>(const Pasting&, const TuneModel&,
+                                                              int);
+template Runner::ProfileOf<float> Runner::profile_of<float>(const Pasting&, const TuneModel&, int);
 
 Runner::Runner(const Pasting& pasting, const Tuning& tuning, const TunedDesign& design)
     : pasting_(&pasting),
@@ -786,8 +792,7 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
   body += "  " + profile + " profile;\n";
   body +=
       "  esokit::HealthMonitor<" + std::to_string(model.order + design.extension) + "> monitor;\n";
-  if (known)
-    body += "  double u = 0.0, fed = 0.0;  // the last u, and the part of it that is known\n";
+  if (known) body += "  double fed = 0.0;  // the part of the last u that is known\n";
   std::string fed, starts, gives, arguments, names;
   for (std::size_t i = 0; i < p.feeds.size(); ++i) {
     const Feed& feed = p.feeds[i];
@@ -930,8 +935,8 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
   body += std::string("  void start(double y, double u_now) {\n") +
           (curved ? "    u_now = actuator.effect(u_now);\n" : "") +
           (approaches ? "    profile.start(y, u_now);\n" : "    profile.reset(y);\n") + starts +
-          (known ? "    u = u_now;\n    fed = " + (fed_at_start.empty() ? "0.0" : fed_at_start) +
-                       ";\n    controller.start(y, u - fed);\n"
+          (known ? "    fed = " + (fed_at_start.empty() ? "0.0" : fed_at_start) +
+                       ";\n    controller.start(y, u_now - fed);\n"
                  : "    controller.start(y, u_now);\n") +
           "    monitor.clear();\n  }\n";
   body +=
@@ -951,14 +956,18 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
         "    const double more = " +
         more +
         ";\n"
-        "    controller.applied(u - fed);  // if the actuator reports what it really held, " +
-        (curved ? "the effect of it " : "") +
-        "in place of u\n"
         "    const double of_law = controller.update(y, r);\n"
         "    // Without y nothing is added.\n"
         "    fed = controller.mode() == esokit::LoopMode::safe ? 0.0 : more;\n"
-        "    u = std::clamp(of_law + fed, " +
-        source(model.u_min) + ", " + source(model.u_max) + ");\n";
+        "    const double u = std::clamp(of_law + fed, " +
+        source(model.u_min) + ", " + source(model.u_max) +
+        ");\n"
+        "    // The law's part of what goes out: the observer and the monitor see these limits, "
+        "too.\n"
+        "    // If the actuator reports what it held, say " +
+        (curved ? "its effect" : "that") +
+        " less fed before the next update.\n"
+        "    controller.applied(u - fed);\n";
   } else {
     body += "    // If the actuator reports what it really held, say controller.applied(" +
             std::string(curved ? "actuator.effect(..)" : "..") +

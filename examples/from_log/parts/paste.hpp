@@ -158,12 +158,16 @@ class Runner {
   /// (r, r', ..) of the last sample.
   [[nodiscard]] const std::array<double, 5>& motion() const { return motion_; }
 
-  using Profile =
-      std::variant<esokit::ApproachProfile<1, most_delay>, esokit::ApproachProfile<2, most_delay>,
-                   esokit::SmoothProfile<2>, esokit::SmoothProfile<3>, esokit::SmoothProfile<4>>;
-  /// @param gains of the law
-  [[nodiscard]] static Profile profile_of(const Pasting& pasting, const esokit::TuneModel& model,
-                                          int gains);
+  template <class S>
+  using ProfileOf =
+      std::variant<esokit::ApproachProfile<1, most_delay, S>,
+                   esokit::ApproachProfile<2, most_delay, S>, esokit::SmoothProfile<2, S>,
+                   esokit::SmoothProfile<3, S>, esokit::SmoothProfile<4, S>>;
+  using Profile = ProfileOf<double>;
+  /// In double or float. @param gains of the law
+  template <class S = double>
+  [[nodiscard]] static ProfileOf<S> profile_of(const Pasting& pasting,
+                                               const esokit::TuneModel& model, int gains);
 
  private:
   const Pasting* pasting_;

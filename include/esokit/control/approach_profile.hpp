@@ -130,7 +130,7 @@ requires(detail::is_a_plain_scalar<S>()) class ApproachProfile {
   /// At rest at y under u: before the first update, and where an operator hands over.
   /// @return false, and nothing changes, if one is not finite, or so large that what follows is not
   bool start(const S& y, const S& u) noexcept {
-    if (!fits(y) || !is_finite(S(config_.input_gain * S(4) * u))) return false;
+    if (!fits(y) || !is_finite(S(config_.input_gain * (S(4) * u)))) return false;
     sum_ = detail::FineSum<S>(y);
     base_ = y;
     target_ = y;
@@ -158,11 +158,10 @@ requires(detail::is_a_plain_scalar<S>()) class ApproachProfile {
 
   /// Whether all that follows from a place is finite.
   [[nodiscard]] bool fits(const S& place) const noexcept {
-    const S speed = S(8) * place / config_.sample_time;
-    return is_finite(S(8) * place) && is_finite(speed) &&
-           is_finite(S(speed / config_.input_gain)) &&
-           is_finite(S(config_.pole * (S(8) * place))) &&
-           is_finite(S(config_.pole * (S(8) * place) / config_.input_gain)) &&
+    const S most = S(8) * place;
+    const S speed = most / config_.sample_time;
+    return is_finite(S(speed / config_.input_gain)) &&
+           is_finite(S(config_.pole * most / config_.input_gain)) &&
            (Order == 1 || is_finite(S(speed / config_.lag)));
   }
 

@@ -238,7 +238,9 @@ requires(detail::is_a_plain_scalar<S>()) class HealthMonitor {
   }
 
   /// Call this after each sample of the controller, an Adrc or DisturbanceCompensator whose
-  /// observer corrects `Size` states.
+  /// observer corrects `Size` states. Where something behind the law limits u, say what goes out by
+  /// `applied` before: a limit there counts as one of the loop. What an actuator reports of the
+  /// sample before is said before `update`, as always.
   template <class Controller>
   void look(const Controller& controller) noexcept {
     watch(controller);
@@ -299,7 +301,7 @@ requires(detail::is_a_plain_scalar<S>()) class HealthMonitor {
     const StepStatus status = controller.status();
     const bool rejected =
         has(status, StepStatus::measurement_rejected) || has(status, StepStatus::outlier_rejected);
-    const S beyond = controller.requested() - controller.output();
+    const S beyond = controller.requested() - controller.limiter().last();
     const S hair = static_cast<S>(1e-4) * range_;
     const int above = beyond > hair ? 1 : 0;
     const int below = beyond < -hair ? 1 : 0;

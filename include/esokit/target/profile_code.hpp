@@ -1,15 +1,16 @@
 /// @file
-/// to_c of a SmoothProfile: the reference of a move as C99.
+/// to_c of a SmoothProfile and an ApproachProfile: the reference of a move as C99.
 #pragma once
 
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <cstddef>
+#include <esokit/control/approach_profile.hpp>
 #include <esokit/control/smooth_profile.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/target/c_code.hpp>
 #include <esokit/target/detail/list_writer.hpp>
+#include <esokit/target/detail/record_access.hpp>
 #include <esokit/target/detail/recorded_design.hpp>
 #include <esokit/target/detail/runtime_text.hpp>
 #include <esokit/target/structured_text.hpp>
@@ -27,7 +28,34 @@ inline constexpr const char* profile_header =
 inline constexpr const char* profile =
 #include <esokit/target/runtime/profile.c>
     ;
+inline constexpr const char* approach_header =
+#include <esokit/target/runtime/approach.h>
+    ;
+inline constexpr const char* approach =
+#include <esokit/target/runtime/approach.c>
+    ;
 }  // namespace runtime
+
+/// `body` gives the motion of a block to its outputs. @param order of the highest derivative
+inline void put_motion(StBlock& block, int order) {
+  block.own("motion : $name_numbers_" + std::to_string(order + 1));
+  block.body += "done := $name_motion(o := o, motion := motion);\n";
+  for (int i = 0; i <= order; ++i) {
+    const std::string r = i == 0 ? "r" : "r" + std::to_string(i);
+    block.output(r + " : $real", i == 0 ? "the reference" : "its derivative");
+    block.body += r + " := motion[" + std::to_string(i) + "];\n";
+  }
+}
+
+/// The block of a profile. @param T its sample time
+template <PlainScalar S>
+Expected<std::string, Error<S>> block_of_profile(StBlock& block, S T) {
+  const StructuredText all = block.text(
+      "(* Written by esokit from a finished profile; do not edit.\n$COMMENT   FUNCTION_BLOCK $name "
+      "is at the end: call it once in each T = " +
+      ListWriter(c_language, false).number(static_cast<double>(T)) + " s. *)\n\n");
+  return all.template expected<S>(all.text);
+}
 
 }  // namespace detail
 
@@ -108,23 +136,91 @@ Expected<std::string, Error<S>> to_structured_text(const SmoothProfile<Order, S>
   block.input("resets : BOOL", "TRUE: is at rest at target");
   block.output("good : BOOL", "FALSE: target is not finite or too far");
   block.output("moves : BOOL");
-  block.own("motion : $name_numbers_" + std::to_string(Order + 1));
   block.body =
       "IF resets THEN\n  good := $name_reset(o := o, value := target);\nELSE\n"
       "  good := $name_update(o := o, target := target);\nEND_IF;\n"
-      "moves := $name_moves(o := o);\ndone := $name_motion(o := o, motion := motion);\n";
-  for (int i = 0; i <= Order; ++i) {
-    const std::string r = i == 0 ? "r" : "r" + std::to_string(i);
-    block.output(r + " : $real", i == 0 ? "the reference" : "its derivative");
-    block.body += r + " := motion[" + std::to_string(i) + "];\n";
+      "moves := $name_moves(o := o);\n";
+  detail::put_motion(block, Order);
+  return detail::block_of_profile(block, detail::RecordAccess::profile(profile).sample_time);
+}
+
+/// A profile towards any target as C99: `name_start` at rest at y under u, then `name_update` once
+/// a sample, `name_motion` for (r, r') or (r, r', r''), and `name_feed`, the u to add to that of
+/// the law. It equals the C++ bit for bit.
+/// @param profile whose settings count, not where it is @return error for the options, as for a
+///        controller
+template <int Order, int Capacity, PlainScalar S>
+Expected<CCode, Error<S>> to_c(const ApproachProfile<Order, Capacity, S>& profile,
+                               const CodeOptions& options = {}) {
+  const auto ok = detail::checked_names<S>(
+      options, [&](const CodeOptions& as) { return detail::text_of(to_c(profile, as)); });
+  if (!ok) return ok.error();
+  const auto numbers = detail::RecordAccess::approach(profile);
+  const auto& config = numbers.config;
+  ApproachProfile<Order, Capacity, S> played = profile;
+  (void)played.start(S(0), S(0));
+  constexpr std::size_t count = static_cast<std::size_t>(Order) + 1;
+  std::vector<std::array<S, count + 2>> vectors;
+  for (int k = 0; k < options.self_test_samples; ++k) {
+    const S way = S((k / 40) % 2 == 0 ? 20 : -10) * config.sample_time * numbers.half_speed;
+    (void)played.update(way);
+    std::array<S, count + 2> sample{way, played.feed()};
+    for (int i = 0; i <= Order; ++i) sample[static_cast<std::size_t>(i + 2)] = played.motion()(i);
+    vectors.push_back(sample);
   }
-  const detail::StructuredText all = block.text(
-      "(* Written by esokit from a finished profile; do not edit.\n$COMMENT   FUNCTION_BLOCK $name "
-      "is at the end: call it once in each T = " +
-      detail::ListWriter(detail::c_language, false)
-          .number(static_cast<double>(detail::RecordAccess::profile(profile).sample_time)) +
-      " s. *)\n\n");
-  return all.template expected<S>(all.text);
+  detail::RuntimeText text(options.name, sizeof(S) == sizeof(float));
+  text.features({{"ESOKIT_LAGS", Order == 2},
+                 {"ESOKIT_DELAYED", numbers.delay > 0},
+                 {"ESOKIT_NEGATIVE", config.input_gain < S(0)}});
+  const auto delay = static_cast<std::size_t>(numbers.delay);
+  text.counts({{"COUNT", count},
+               {"DELAY", delay},
+               {"PLACES", delay * count},
+               {"COLUMNS", count + 2},
+               {"SAMPLES", vectors.size()}});
+  text.constant("ORDER", std::to_string(Order));
+  text.number("SAMPLE_TIME", config.sample_time);
+  text.number("POLE", config.pole);
+  text.number("LAG", config.lag);
+  text.number("INPUT_GAIN", config.input_gain);
+  text.number("UPPER", config.limits.upper);
+  text.number("LOWER", config.limits.lower);
+  text.number("MOST", S(S(9) / S(10)));
+  text.number("LEAST", S(numbers.half_speed / S(10)));
+  text.number("BY_BANDWIDTH", S(-numbers.share));
+  text.number("DECAY", numbers.decay);
+  text.number("DIGITS", S(S(8) * detail::rounding<S>()));
+  text.lines("DESIGN_ABOUT", options.comment.empty() ? "" : " * " + options.comment + "\n");
+  text.lines("DESIGN_VECTORS", text.writer().rows(vectors));
+  return CCode{text.header(detail::runtime::approach_header),
+               text.source({detail::runtime::head, detail::runtime::approach}),
+               {}};
+}
+
+/// The same as a function block in Structured Text, a call of which is a sample: its C, translated.
+/// @param profile as for to_c @return the text, or an error as for to_c
+template <int Order, int Capacity, PlainScalar S>
+Expected<std::string, Error<S>> to_structured_text(
+    const ApproachProfile<Order, Capacity, S>& profile, const CodeOptions& options = {}) {
+  const auto code = to_c(profile, options);
+  if (!code) return code.error();
+  const auto new_names = detail::new_names_in_block<S>(
+      options, [&](const CodeOptions& as) { return to_structured_text(profile, as); });
+  if (!new_names) return new_names.error();
+  detail::StBlock block(*code, options, sizeof(S) == sizeof(float), "_init");
+  block.input("target : $real", "where to go; it may change at any time");
+  block.input("y : $real", "if starts");
+  block.input("u_held : $real", "if starts");
+  block.input("starts : BOOL", "TRUE: the machine rests at y under u_held, before the sample");
+  block.output("started : BOOL", "FALSE: not finite or too large, nothing changed");
+  block.output("good : BOOL", "FALSE: target is not finite or too large, the last one counts");
+  block.output("feed : $real", "to be added to u of the law");
+  block.body =
+      "started := FALSE;\nIF starts THEN\n  started := $name_start(o := o, y := y, u := u_held);\n"
+      "END_IF;\ngood := $name_update(o := o, target := target);\nfeed := $name_feed(o := o);\n";
+  detail::put_motion(block, Order);
+  return detail::block_of_profile(block,
+                                  detail::RecordAccess::approach(profile).config.sample_time);
 }
 
 }  // namespace esokit

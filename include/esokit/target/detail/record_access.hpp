@@ -676,6 +676,18 @@ struct RecordAccess {
     return numbers;
   }
 
+  /// The settings of an ApproachProfile, and what it computes from them.
+  template <class P>
+  static auto approach(const P& p) noexcept {
+    using S = typename P::scalar_type;
+    struct {
+      typename P::Config config;
+      S share, decay, half_speed;
+      std::int32_t delay;
+    } const numbers{p.config_, p.share_, p.decay_, p.half_speed_, p.delay_};
+    return numbers;
+  }
+
   /// The settings of a TimeProportioned.
   template <class P>
   static auto proportioned(const P& p) noexcept {

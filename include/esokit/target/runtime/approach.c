@@ -1,0 +1,184 @@
+#ifdef __cplusplus
+R"esokit("
+#endif
+/* Whether all that follows from a place is finite. */
+static bool fits(real place)
+{
+  const real most = 8.0 * place;
+  const real speed = most / SAMPLE_TIME;
+#if ESOKIT_LAGS
+  if (!is_finite(speed / LAG)) {
+    return false;
+  }
+#endif
+  return is_finite(speed / INPUT_GAIN) && is_finite((POLE * most) / INPUT_GAIN);
+}
+
+/* A change within what the limits of u leave at this place, in a sample. */
+static real within(const esokit_state *o, real change, real place)
+{
+  const real held = o->held + ((POLE * (place - o->begin)) / INPUT_GAIN);
+#if ESOKIT_NEGATIVE
+  real up = (INPUT_GAIN * (LOWER - held)) * MOST;
+  real down = (INPUT_GAIN * (UPPER - held)) * MOST;
+#else
+  real up = (INPUT_GAIN * (UPPER - held)) * MOST;
+  real down = (INPUT_GAIN * (LOWER - held)) * MOST;
+#endif
+  real inside = change;
+  if (!(up > LEAST)) {
+    up = LEAST;
+  }
+  if (!(down < -LEAST)) {
+    down = -LEAST;
+  }
+  up = up * SAMPLE_TIME;
+  down = down * SAMPLE_TIME;
+  if (change > up) {
+    inside = up;
+  }
+  if (change < down) {
+    inside = down;
+  }
+  return inside;
+}
+
+/* Loses no small change. */
+static void move(esokit_state *o, real change)
+{
+  real sum;
+  real taken;
+  o->rest = o->rest + change;
+  if (fabs(o->rest) <= (DIGITS * fabs(o->whole))) {
+    return;
+  }
+  sum = o->whole + o->rest;
+  taken = sum - o->whole;
+  o->rest = (o->whole - (sum - taken)) + (o->rest - taken);
+  o->whole = sum;
+}
+
+/* The motion of the dead time ago. */
+static void delay(esokit_state *o, const real now[COUNT])
+{
+  unsigned i;
+#if ESOKIT_DELAYED
+  for (i = 0u; i < COUNT; ++i) {
+    o->motion[i] = o->past[o->oldest + i];
+    o->past[o->oldest + i] = now[i];
+  }
+  o->oldest = o->oldest + COUNT;
+  if (o->oldest >= PLACES) {
+    o->oldest = 0u;
+  }
+#else
+  for (i = 0u; i < COUNT; ++i) {
+    o->motion[i] = now[i];
+  }
+#endif
+}
+
+bool esokit_start(esokit_state *o, real y, real u)
+{
+  unsigned i;
+  if (!(fits(y) && is_finite(INPUT_GAIN * (4.0 * u)))) {
+    return false;
+  }
+  o->target = y;
+  o->whole = y;
+  o->rest = 0.0;
+#if ESOKIT_LAGS
+  o->behind = 0.0;
+#endif
+  o->begin = y;
+  o->held = u;
+  o->feed = 0.0;
+  for (i = 0u; i < COUNT; ++i) {
+    o->motion[i] = 0.0;
+  }
+  o->motion[0] = y;
+#if ESOKIT_DELAYED
+  for (i = 0u; i < PLACES; ++i) {
+    o->past[i] = 0.0;
+  }
+  for (i = 0u; i < DELAY; ++i) {
+    o->past[i * COUNT] = y;
+  }
+  o->oldest = 0u;
+#endif
+  return true;
+}
+
+bool esokit_update(esokit_state *o, real target)
+{
+  const bool good = fits(target);
+  const real place = o->whole + o->rest;
+  real now[COUNT];
+  real change;
+  real speed;
+  real needed;
+  if (good) {
+    o->target = target;
+  }
+  change = within(o, BY_BANDWIDTH * ((o->whole - o->target) + o->rest), place);
+  speed = change / SAMPLE_TIME;
+#if ESOKIT_LAGS
+  now[0] = place - o->behind;
+  now[1] = o->behind / LAG;
+  now[2] = (speed - now[1]) / LAG;
+  o->behind = (speed * LAG) + (DECAY * (o->behind - (speed * LAG)));
+#else
+  now[0] = place;
+  now[1] = speed;
+#endif
+  move(o, change);
+  delay(o, now);
+  /* u is held for a sample: it needs what the middle of it does. */
+  needed = (POLE * ((place - o->begin) + (change / 2.0))) + (now[1] - o->motion[1]);
+#if ESOKIT_LAGS
+  needed = needed + (LAG * (now[2] - o->motion[2]));
+#endif
+  o->feed = needed / INPUT_GAIN;
+  return good;
+}
+
+void esokit_motion(const esokit_state *o, real motion[COUNT])
+{
+  unsigned i;
+  for (i = 0u; i < COUNT; ++i) {
+    motion[i] = o->motion[i];
+  }
+}
+
+real esokit_feed(const esokit_state *o)
+{
+  return o->feed;
+}
+
+#ifdef ESOKIT_SELF_TEST
+int esokit_self_test(real tolerance)
+{
+  static const real samples[SAMPLES][COLUMNS] = { /* target, feed, motion */
+    DESIGN_VECTORS
+  };
+  esokit_state o;
+  unsigned i;
+  unsigned k;
+  (void)esokit_start(&o, 0.0, 0.0);
+  for (i = 0u; i < SAMPLES; ++i) {
+    (void)esokit_update(&o, samples[i][0]);
+    if (!(fabs(o.feed - samples[i][1]) <= tolerance)) {
+      return (int)i + 1;
+    }
+    for (k = 0u; k < COUNT; ++k) {
+      if (!(fabs(o.motion[k] - samples[i][k + 2u]) <= tolerance)) {
+        return (int)i + 1;
+      }
+    }
+  }
+  return 0;
+}
+#endif
+#ifdef __cplusplus
+")esokit"
+#endif
