@@ -377,6 +377,7 @@ TEST(Health, ALimitBehindTheLawIsOne) {
   for (const double side : {1.0, -1.0}) {
     for (const bool in_time : {true, false}) {
       auto loop = loop_of(20, 10);
+      (void)loop.start(0.1, 0);
       auto monitor = monitor_of();
       for (int k = 0; k < 5000; ++k) {
         const double u = std::clamp(loop.update(0.1, 0.1 + 0.1 * side), -1.0, 1.0);
