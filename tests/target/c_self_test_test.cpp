@@ -4,8 +4,11 @@
 #include <cstdio>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/predictive_adrc.hpp>
+#include <esokit/control/smooth_profile.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/target/c_code.hpp>
+#include <esokit/target/fixed_point.hpp>
+#include <esokit/target/profile_code.hpp>
 #include <fstream>
 #include <string>
 
@@ -24,21 +27,25 @@ Observer::Config settings_of_observer() {
 
 template <class C>
 C controller() {
-  return C::make({.observer = settings_of_observer(),
-                  .controller_bandwidth = 15,
-                  .limits = {.lower = -5, .upper = 5}})
-      .value();
+  typename C::Config settings{};
+  settings.observer = {.observer_bandwidth = 100,
+                       .input_gain = 50,
+                       .sample_time = typename C::scalar_type(1e-3),
+                       .max_gap = 10};
+  settings.controller_bandwidth = 15;
+  settings.limits.lower = -5;
+  settings.limits.upper = 5;
+  return C::make(settings).value();
 }
 
-/// What gcov says of loop.c in per cent: lines, and branches that were taken.
-template <class Object>
-void reaches(const Object& object) {
-  SCOPED_TRACE(testing::internal::GetTypeName<Object>());
+/// What gcov says of loop.c in per cent: lines, and branches that were taken. @param given to the
+/// self-test
+void reaches(const CCode& code, const std::string& given = "0.0f") {
   const Folder folder;
-  const CCode code = to_c(object, {.name = "loop"}).value();
   folder.write("loop.h", code.header);
   folder.write("loop.c", code.source);
-  folder.write("main.c", "#include \"loop.h\"\nint main(void) { return loop_self_test(0.0f); }\n");
+  folder.write("main.c",
+               "#include \"loop.h\"\nint main(void) { return loop_self_test(" + given + "); }\n");
   ASSERT_TRUE(runs("cd " + folder.file("") +
                    " && gcc -std=c99 -O0 --coverage -DLOOP_SELF_TEST main.c loop.c -o all -lm && "
                    "./all && gcov -b all-loop.gcda >found.txt 2>&1"));
@@ -58,9 +65,31 @@ void reaches(const Object& object) {
 
 TEST(CSelfTest, ReachesNearlyAll) {
   if (!there("gcc") || !there("gcov")) GTEST_SKIP() << "no gcov";
-  reaches(Observer::make(settings_of_observer()).value());
-  reaches(controller<Adrc<Observer>>());
-  reaches(controller<PredictiveAdrc<Observer>>());
+  const CodeOptions loop{.name = "loop"};
+  reaches(to_c(Observer::make(settings_of_observer()).value(), loop).value());
+  reaches(to_c(controller<Adrc<Observer>>(), loop).value());
+  reaches(to_c(controller<PredictiveAdrc<Observer>>(), loop).value());
+}
+
+TEST(CSelfTest, ReachesNearlyAllOfAProfile) {
+  if (!there("gcc") || !there("gcov")) GTEST_SKIP() << "no gcov";
+  SmoothProfileConfig<2, float> settings{.sample_time = 0.004F};
+  settings.limits = {3.0F, 20.0F};
+  reaches(to_c(SmoothProfile<2, float>::make(settings).value(), {.name = "loop"}).value());
+}
+
+template <class C>
+CCode in_integers() {
+  FixedPointOptions options;
+  options.y = {.unit = 6.2831853 / 4096, .most = 2048};
+  options.u = {.unit = 0.01, .most = 1000};
+  options.code.name = "loop";
+  return to_fixed_c(controller<C>(), options).value().code;
+}
+
+TEST(CSelfTest, ReachesNearlyAllInIntegers) {
+  if (!there("gcc") || !there("gcov")) GTEST_SKIP() << "no gcov";
+  reaches(in_integers<Adrc<LinearEso<2>>>(), "");
 }
 
 TEST(CSelfTest, FailsWhereTheCodeWasChanged) {

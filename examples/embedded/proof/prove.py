@@ -6,8 +6,9 @@
 FOLDER has kinds.tsv (name, title, least and largest u) and the C of each kind in a folder of its name.
 From its header a driver is made: it calls every function for ever, in any order, each time with any
 numbers, infinite ones and NaN too. Eva looks at all executions of it at once. What has to hold: no alarm
-(undefined behaviour), u within its limits, each number of the state finite after every call. Then C
-that was broken is to be refused. The table of README.md is compared, but for the seconds, or written.
+(undefined behaviour), u within its limits, each number of the state finite after every call. Of C in
+integers integers.py proves the step of a valid sample, and Eva all else. Then C that was broken is to
+be refused. The table of README.md is compared, but for the seconds, or written.
 """
 
 import os
@@ -16,14 +17,17 @@ import resource
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
+
+import integers
 
 PAGE = Path(__file__).resolve().parents[1] / "README.md"
 BEGIN, END = "<!-- proofs: written by prove.sh -->\n", "<!-- end of proofs -->"
 SECONDS = 300  # of the processor, for each proof
 
-# Enough for a change of the C: the plain controller, one with all counts, an output.
-FEW = ("plain", "gated", "profile", "proportioned")
+# Enough for a change of the C: the plain controller, one with all counts, an output, integers.
+FEW = ("plain", "gated", "profile", "proportioned", "integers")
 # What is done to the plain controller, and what may then hold no longer.
 BROKEN = (
     ("a limit one higher", "7.0f < t1", "8.0f < t1", "u_within"),
@@ -32,9 +36,16 @@ BROKEN = (
     ("a check left out", "  if (!is_finite(u)) {\n    return PLAIN_INPUT_REJECTED;\n  }\n  if (o->",
      "  if (o->", "finite_u_last"),
 )
+# And to the step in integers, each of which may then be too large for its line or its state.
+BROKEN_STEP = (
+    ("twice the u in integers", r"(u \* )(\d+)(;)", lambda m: m[1] + str(2 * int(m[2])) + m[3]),
+    ("a shift of one bit less", r"(t2 >> )(\d+)(; /\* 2\^-21)", lambda m: m[1] + str(int(m[2]) - 1) + m[3]),
+    ("a range of 3 / 4", r"(predict_slowly[\s\S]*?most\[STATES\] = \{)(\d+)(,)",
+     lambda m: m[1] + str(int(m[2]) * 3 // 4) + m[3]),
+)
 
 ANY = {"float": "any_float", "double": "any_double", "unsigned": "any_unsigned", "uint8_t": "any_8",
-       "uint16_t": "any_16", "uint32_t": "any_32", "bool": "any_bool"}
+       "uint16_t": "any_16", "uint32_t": "any_32", "int32_t": "any_signed", "bool": "any_bool"}
 HEAD = """#include "{name}.h"
 #include <stdbool.h>
 volatile float any_float;
@@ -43,7 +54,14 @@ volatile unsigned any_unsigned;
 volatile uint8_t any_8;
 volatile uint16_t any_16;
 volatile uint32_t any_32;
+volatile int32_t any_signed;
 volatile bool any_bool;
+
+int32_t any_within(int32_t low, int32_t high)
+{{
+  const int32_t x = any_signed;
+  return (x < low) ? low : ((x > high) ? high : x);
+}}
 
 int main(void)
 {{
@@ -100,8 +118,8 @@ class Header:
             else:
                 given.append(ANY[kind])
         call = f"{function}({', '.join(given)});"
-        if result in ("float", "double") and own != "estimate":
-            low, high = limits
+        if result in ("float", "double", "int32_t") and own != "estimate":
+            low, high = limits[:2]
             lines.append(f"{result} u = {call}")
             if low != "-":
                 checks = [f"/*@ assert u_within: {low} <= u <= {high}; */"]
@@ -109,7 +127,7 @@ class Header:
             lines.append(call if result == "void" else "(void)" + call)
         return lines + checks
 
-    def driver(self, limits):
+    def driver(self, limits, reach):
         text = HEAD.format(name=self.name)
         names = [function[len(self.name) + 1:] for _, function, _ in self.functions]
         first = next(one for one in ("init", "clear", "reset") if one in names)
@@ -125,6 +143,8 @@ class Header:
         text += "    }\n"
         for place in self.numbers(f"{self.name}_state", "o"):
             text += f"    /*@ assert finite_{re.split('[.[]', place)[1]}: \\is_finite({place}); */\n"
+        for i, most in enumerate(reach):
+            text += f"    /*@ assert finite_x{i}: {-most} <= o.x[{i}] <= {most}; */\n"
         return text + "  }\n}\n"
 
 
@@ -140,13 +160,21 @@ def proven(at, name, limits, source=None):
     """{what: text of a cell} of one kind."""
     at.mkdir(exist_ok=True)
     header = (at / f"{name}.h").read_text()
-    driver = Header(name, header).driver(limits)
-    (at / "driver.c").write_text(driver)
     if source is not None:
         (at / f"{name}.c").write_text(source)
-    started = used()
+    started, own = used(), time.process_time()
+    source = (at / f"{name}.c").read_text()
+    failed, reach, text = set(), [], source
+    if "static void observe(" in source:  # in integers
+        found = integers.Proof(source)
+        failed |= {f"finite_{line}" for line, *_ in found.beyond}
+        reach, text = found.reach, found.for_eva()
+    (at / "shown.c").write_text(text)
+    driver = Header(name, header).driver(limits, reach)
+    (at / "driver.c").write_text(driver)
     command = ["frama-c", "-eva", "-eva-precision", "5", "-warn-special-float", "none",
-               "-eva-msg-key=-final-states,-initial-state", "driver.c", f"{name}.c"]
+               "-no-warn-right-shift-negative", "-eva-msg-key=-final-states,-initial-state",
+               "driver.c", "shown.c"]
     run = subprocess.run(command, cwd=at, env={**os.environ, "PWD": str(at)}, text=True, check=False,
                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT, preexec_fn=limited)
     (at / "log.txt").write_text(run.stdout)
@@ -156,16 +184,17 @@ def proven(at, name, limits, source=None):
                 "failed": {"time"}}
     if run.returncode != 0 or not alarms:
         sys.exit(run.stdout[-2000:])
-    failed = set(re.findall(r"assertion '(\w+)' got status", run.stdout))
+    failed |= set(re.findall(r"assertion '(\w+)' got status", run.stdout))
     reached = re.search(r"Assertions +\d+ valid.* (\d+) total", run.stdout)
-    if not reached or int(reached.group(1)) != driver.count("assert"):
+    if not reached or int(reached.group(1)) != driver.count("assert") + text.count("assert"):
         failed |= {"u_within", "finite_all"}  # as execution ends before some of them
     unseen = ", ".join(sorted(one[7:] for one in failed if one.startswith("finite_")))
     low, high = limits
+    states = "within their ranges" if reach else "finite"
     return {"alarms": alarms.group(1),
             "u": "not proven" if "u_within" in failed else f"{low} .. {high}" if low != "-" else "",
-            "states": f"not proven: {unseen}" if unseen else "finite",
-            "seconds": f"{used() - started:.0f}",
+            "states": f"not proven: {unseen}" if unseen else states,
+            "seconds": f"{used() - started + time.process_time() - own:.0f}",
             "failed": failed | ({"alarms"} if alarms.group(1) != "0" else set())}
 
 
@@ -212,6 +241,12 @@ def main():
         (at / "plain.h").write_text((folder / "plain" / "plain.h").read_text())
         broken = source.replace(old, new)
         refused = source.count(old) == 1 and what in proven(at, "plain", plain, broken)["failed"]
+        print("ok     refused:" if refused else "FAILED not refused:", title, flush=True)
+        passed, failed = passed + refused, failed + (not refused)
+    source = (folder / "integers" / "integers.c").read_text()
+    for title, old, new in () if names else BROKEN_STEP:
+        broken = re.sub(old, new, source, count=1)
+        refused = broken != source and bool(integers.Proof(broken).beyond)
         print("ok     refused:" if refused else "FAILED not refused:", title, flush=True)
         passed, failed = passed + refused, failed + (not refused)
     print(f"{passed} passed, {failed} failed")

@@ -14,6 +14,7 @@
 #include <esokit/target/detail/recorded_design.hpp>
 #include <esokit/target/detail/runtime_text.hpp>
 #include <esokit/target/structured_text.hpp>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -57,6 +58,33 @@ Expected<std::string, Error<S>> block_of_profile(StBlock& block, S T) {
   return all.template expected<S>(all.text);
 }
 
+/// What the self-test of a profile does at a sample.
+struct ProfileCall {
+  double target;
+  bool is_infinite = false;
+  bool resets = false;
+};
+
+/// Moves to and fro, and between them what is refused, a rest, and a move of no length.
+inline ProfileCall profile_call(int sample, double largest) {
+  switch (sample) {
+    case 50:
+      return {.target = 4, .is_infinite = true};
+    case 60:
+      return {.target = 0, .resets = true};
+    case 61:
+      return {.target = 0};
+    case 62:
+      return {.target = largest};
+    case 63:
+      return {.target = 4, .is_infinite = true, .resets = true};
+    case 64:
+      return {.target = 8 / largest};
+    default:
+      return {.target = (sample / 40) % 2 == 0 ? 1.0 : -0.5};
+  }
+}
+
 }  // namespace detail
 
 /// A profile as C99: `name_reset`, then `name_update` once a sample and `name_motion` for (r, r',
@@ -92,24 +120,33 @@ Expected<CCode, Error<S>> to_c(const SmoothProfile<Order, S>& profile,
     for (std::size_t k = 0; k + 1 < c.size(); ++k) c[k] = static_cast<S>(k + 1) * c[k + 1];
     c.back() = S(0);
   }
+  constexpr S largest = (std::numeric_limits<S>::max)();
   SmoothProfile<Order, S> played = profile;
   std::vector<std::vector<S>> vectors;
   for (int k = 0; k < options.self_test_samples; ++k) {
-    const S target = static_cast<S>((k / 40) % 2 == 0 ? 1.0 : -0.5);
-    (void)played.update(target);
+    const auto call = detail::profile_call(k, static_cast<double>(largest));
+    const S target = static_cast<S>(call.target);
+    const S given = call.is_infinite ? target * largest : target;
+    if (call.resets) {
+      (void)played.reset(given);
+    } else {
+      (void)played.update(given);
+    }
     const auto motion = played.motion();
-    std::vector<S> sample{target};
+    std::vector<S> sample{target,
+                          static_cast<S>((call.is_infinite ? 1 : 0) + (call.resets ? 2 : 0))};
     for (int i = 0; i <= Order; ++i) sample.push_back(motion(i));
     vectors.push_back(sample);
   }
   text.counts({{"COUNT", polynomials.size()},
                {"TERMS", c.size()},
-               {"COLUMNS", polynomials.size() + 1},
+               {"COLUMNS", polynomials.size() + 2},
                {"SAMPLES", vectors.size()}});
   text.constant("ORDER", std::to_string(Order));
   text.number("SAMPLE_TIME", numbers.sample_time);
   text.number("SHORTEST_TIME", numbers.shortest_time);
   text.number("LONGER", numbers.longer);
+  text.number("LARGEST", largest);
   text.number("MOST_SAMPLES", static_cast<S>(1 << 30));
   text.replace("DESIGN_ROOTS", Order > 2 ? "sqrt and cbrt" : "sqrt");
   text.lines("DESIGN_ABOUT", options.comment.empty() ? "" : " * " + options.comment + "\n");

@@ -93,6 +93,9 @@ inline PlannedCall planned(int sample, const TestNumbers& of) {
       PlannedCall{72, TestCall::reports, bad_y, 4, of.huge},
       PlannedCall{73, TestCall::update, bad_y, 4},
       PlannedCall{.sample = 76, .call = TestCall::starts, .beside = 0},
+      // What is reported after a start is the u that a bad r leaves as it is.
+      PlannedCall{.sample = 77, .call = TestCall::reports, .beside = of.step},
+      PlannedCall{.sample = 78, .call = TestCall::update, .bad = bad_beside, .beside = 4},
   };
   const auto* const found =
       std::find_if(all.begin(), all.end(), [=](const auto& one) { return one.sample == sample; });

@@ -272,6 +272,7 @@ class FixedText {
     const auto u = static_cast<std::size_t>(options.u.most);
     text_.constant("Y_MOST", std::to_string(y));
     text_.count("Y_MOST_U", y);
+    text_.constant("Y_BEYOND", std::to_string(y + 1));
     text_.count("Y_TWICE", 2 * y);
     text_.constant("U_MOST", std::to_string(u));
     text_.count("U_MOST_U", u);

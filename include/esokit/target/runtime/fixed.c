@@ -406,6 +406,103 @@ unsigned esokit_adopt(esokit_state *o, const esokit_settings *settings)
 
 #endif
 #ifdef ESOKIT_SELF_TEST
+#define FAR_Y ((y_count)Y_BEYOND)
+
+/* What differs in two statuses, but whether a state was held. */
+static unsigned differs(unsigned status, unsigned expected)
+{
+  return (status ^ expected) & (ESOKIT_MEASUREMENT_REJECTED | ESOKIT_INPUT_REJECTED |
+    ESOKIT_GAP_BRIDGED | ESOKIT_RESTARTED | ESOKIT_REFERENCE_REJECTED);
+}
+
+/* Zero, if counts outside their ranges, gaps and what leads out of them are taken as such. */
+static unsigned wrong_at_edges(esokit_state *o)
+{
+  const unsigned bridged = (ROWS > 1u) ? ESOKIT_GAP_BRIDGED : ESOKIT_RESTARTED;
+  const unsigned longest = (ROWS > 1u) ? ESOKIT_GAP_BRIDGED : 0u;
+  unsigned high = 0u;
+  unsigned low = 0u;
+  unsigned wrong = (unsigned)within((int64_t)U_MOST + 1, U_MOST, &high) ^ U_MOST_U;
+  unsigned i;
+  wrong |= (unsigned)(within(-(int64_t)U_MOST - 1, U_MOST, &low) + U_MOST);
+  wrong |= (high ^ ESOKIT_SATURATED) | (low ^ ESOKIT_SATURATED);
+#if ESOKIT_SETTINGS
+  wrong |= esokit_adopt(o, o->settings);
+#endif
+#if ESOKIT_CONTROLLER
+#if !ESOKIT_COUNTER
+  wrong |= differs(esokit_start(o, FAR_Y, 0), ESOKIT_MEASUREMENT_REJECTED);
+#endif
+  wrong |= differs(esokit_start(o, 0, U_MOST + 1), ESOKIT_INPUT_REJECTED);
+  wrong |= differs(esokit_start(o, 0, -U_MOST - 1), ESOKIT_INPUT_REJECTED);
+  wrong |= esokit_start(o, 0, 0);
+#else
+#if !ESOKIT_COUNTER
+  wrong |= differs(esokit_reset(o, FAR_Y), ESOKIT_MEASUREMENT_REJECTED);
+#endif
+  wrong |= esokit_reset(o, 0);
+#endif
+  for (i = 0u; i <= STATES; ++i) {
+    wrong |= (unsigned)esokit_estimate(o, i);
+  }
+#if ESOKIT_CONTROLLER
+  wrong |= differs(esokit_applied(o, U_MOST + 1), ESOKIT_INPUT_REJECTED);
+  wrong |= differs(esokit_applied(o, -U_MOST - 1), ESOKIT_INPUT_REJECTED);
+  wrong |= esokit_applied(o, 0);
+  (void)esokit_update(o, FAR_Y, 0);
+  wrong |= differs(o->status, ESOKIT_MEASUREMENT_REJECTED);
+  (void)esokit_update(o, 0, 0);
+  wrong |= differs(o->status, bridged);
+#if !ESOKIT_COUNTER
+  (void)esokit_update(o, 0, -FAR_Y);
+  wrong |= differs(o->status, ESOKIT_REFERENCE_REJECTED);
+  (void)esokit_update(o, 0, FAR_Y);
+  wrong |= differs(o->status, ESOKIT_REFERENCE_REJECTED);
+#endif
+  for (i = 1u; i < ROWS; ++i) {
+    (void)esokit_update_without_measurement(o, 0);
+  }
+  (void)esokit_update(o, 0, 0);
+  wrong |= differs(o->status, longest);
+  for (i = 0u; i < ROWS; ++i) {
+    (void)esokit_update_without_measurement(o, 0);
+  }
+  (void)esokit_update(o, 0, 0);
+  wrong |= differs(o->status, ESOKIT_RESTARTED);
+  for (i = 0u; i <= GAP_MOST; ++i) {
+    (void)esokit_update_without_measurement(o, 0);
+  }
+  wrong |= (unsigned)o->mode ^ ((GAP_MOST >= MISSING_LIMIT) ? ESOKIT_SAFE : ESOKIT_RUNNING);
+#if !ESOKIT_COUNTER
+  (void)esokit_update(o, FAR_Y, 0);
+  wrong |= differs(o->status, ESOKIT_MEASUREMENT_REJECTED);
+#endif
+  (void)esokit_update(o, 0, 0);
+  wrong |= differs(o->status, ESOKIT_RESTARTED);
+#if !ESOKIT_STAYS_SAFE
+  wrong |= (unsigned)o->mode ^ ESOKIT_RUNNING;
+#endif
+#else
+  wrong |= differs(esokit_update(o, FAR_Y, 0), ESOKIT_MEASUREMENT_REJECTED);
+  wrong |= differs(esokit_update(o, 0, 0), bridged);
+  wrong |= differs(esokit_update(o, 0, U_MOST + 1), ESOKIT_INPUT_REJECTED);
+  wrong |= differs(esokit_predict(o, -U_MOST - 1), ESOKIT_INPUT_REJECTED);
+  wrong |= differs(esokit_update(o, 0, 0), bridged);
+  for (i = 1u; i < ROWS; ++i) {
+    (void)esokit_predict(o, 0);
+  }
+  wrong |= differs(esokit_update(o, 0, 0), longest);
+  for (i = 0u; i <= GAP_MOST; ++i) {
+    (void)esokit_predict(o, 0);
+  }
+#if !ESOKIT_COUNTER
+  wrong |= differs(esokit_update(o, FAR_Y, 0), ESOKIT_MEASUREMENT_REJECTED);
+#endif
+  wrong |= differs(esokit_update(o, 0, 0), ESOKIT_RESTARTED);
+#endif
+  return wrong;
+}
+
 int esokit_self_test(void)
 {
   static const int32_t samples[SAMPLES][3] = { /* DESIGN_COLUMNS */
@@ -427,7 +524,7 @@ int esokit_self_test(void)
       return i + 1;
     }
   }
-  return 0;
+  return (wrong_at_edges(&o) == 0u) ? 0 : (SAMPLES + 1);
 }
 #endif
 #ifdef __cplusplus

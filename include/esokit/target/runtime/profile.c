@@ -139,7 +139,7 @@ void esokit_motion(const esokit_state *o, real motion[COUNT])
 #ifdef ESOKIT_SELF_TEST
 int esokit_self_test(real tolerance)
 {
-  static const real samples[SAMPLES][COLUMNS] = { /* target, motion */
+  static const real samples[SAMPLES][COLUMNS] = { /* target, 1: infinite, 2: reset, motion */
     DESIGN_VECTORS
   };
   esokit_state o;
@@ -147,11 +147,20 @@ int esokit_self_test(real tolerance)
   unsigned k;
   (void)esokit_reset(&o, 0.0);
   for (i = 0u; i < SAMPLES; ++i) {
+    const unsigned call = (unsigned)samples[i][1];
+    real target = samples[i][0];
     real motion[COUNT];
-    (void)esokit_update(&o, samples[i][0]);
+    if ((call % 2u) != 0u) {
+      target = target * LARGEST;
+    }
+    if (call < 2u) {
+      (void)esokit_update(&o, target);
+    } else {
+      (void)esokit_reset(&o, target);
+    }
     esokit_motion(&o, motion);
     for (k = 0u; k < COUNT; ++k) {
-      if (!(fabs(motion[k] - samples[i][k + 1u]) <= tolerance)) {
+      if (!(fabs(motion[k] - samples[i][k + 2u]) <= tolerance)) {
         return (int)i + 1;
       }
     }
