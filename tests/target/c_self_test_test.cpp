@@ -11,6 +11,7 @@
 #include <esokit/target/profile_code.hpp>
 #include <fstream>
 #include <string>
+#include <vector>
 
 namespace esokit_test {
 namespace target_c_self_test_test {
@@ -92,17 +93,16 @@ TEST(CSelfTest, ReachesNearlyAllInIntegers) {
   reaches(in_integers<Adrc<LinearEso<2>>>(), "");
 }
 
-TEST(CSelfTest, FailsWhereTheCodeWasChanged) {
-  if (!there("gcc")) GTEST_SKIP() << "no gcc";
-  struct Change {
-    const char *from, *to;
-  };
-  const CCode code = to_c(controller<Adrc<Observer>>(), {.name = "loop"}).value();
-  for (const auto& [from, to] : {Change{"", ""}, Change{"row = elapsed - 1u", "row = 0u * elapsed"},
-                                 Change{"o->gap > ROWS", "o->gap > 60000u"},
-                                 Change{"o->gap >= MISSING_LIMIT", "o->gap >= 60000u"},
-                                 Change{"(status & LOOP_RESTARTED) != 0u", "status > 999u"},
-                                 Change{"u = commanded(o)", "u = 0.5f * commanded(o)"}}) {
+struct Change {
+  const char *from, *to;
+};
+
+/// That the self-test passes, and no longer after any of the changes. @param given to it
+template <class... Given>
+void notices(const CCode& code, const std::vector<Change>& changes, Given... given) {
+  std::vector<Change> all{{"", ""}};
+  all.insert(all.end(), changes.begin(), changes.end());
+  for (const auto& [from, to] : all) {
     SCOPED_TRACE(from);
     CCode changed = code;
     const std::size_t at = changed.source.find(from);
@@ -110,11 +110,38 @@ TEST(CSelfTest, FailsWhereTheCodeWasChanged) {
     changed.source.replace(at, std::string(from).size(), to);
     const Folder folder;
     const Library library(folder, changed, "", "gcc -std=c99 -Wno-error");
-    int (*self_test)(float) = nullptr;
+    int (*self_test)(Given...) = nullptr;
     library.find(self_test, "loop_self_test");
     ASSERT_NE(self_test, nullptr);
-    EXPECT_EQ(self_test(0) == 0, from[0] == '\0');
+    EXPECT_EQ(self_test(given...) == 0, from[0] == '\0');
   }
+}
+
+TEST(CSelfTest, FailsWhereTheCodeWasChanged) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  notices(to_c(controller<Adrc<Observer>>(), {.name = "loop"}).value(),
+          {{"row = elapsed - 1u", "row = 0u * elapsed"},
+           {"o->gap > ROWS", "o->gap > 60000u"},
+           {"o->gap >= MISSING_LIMIT", "o->gap >= 60000u"},
+           {"(status & LOOP_RESTARTED) != 0u", "status > 999u"},
+           {"u = commanded(o)", "u = 0.5f * commanded(o)"},
+           {"o->elsewhere != 0u", "o->elsewhere > 9u"},
+           {"*o = before;", "o->z1 = before.z1;"},
+           {"fabsf(y) < fabsf(o->z1)", "fabsf(y) > fabsf(o->z1)"},
+           {"held = o->u_applied", "held = 0.0f * o->u_applied"}},
+          0.0F);
+}
+
+TEST(CSelfTest, FailsWhereIntegersWereChanged) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  notices(in_integers<Adrc<LinearEso<2>>>(),
+          {{"o->gap != GAP_MOST", "o->gap != 1u"},
+           {"o->gap >= MISSING_LIMIT", "o->gap > MISSING_LIMIT + 9u"},
+           {"held = -most", "held = most"},
+           {"o->u_held = -U_MOST;\n    status = LOOP_INPUT_REJECTED",
+            "o->u_held = -U_MOST;\n    status = 0u"},
+           {"return LOOP_MEASUREMENT_REJECTED", "return 0u"},
+           {"o->gap = 0u;\n  } else", "o->gap = 1u;\n  } else"}});
 }
 
 #endif  // ESOKIT_LOADS_C

@@ -1,30 +1,19 @@
 // Writes the C of each kind that prove.sh proves: NAME.[hc] into a folder NAME of the folder that
 // is given. Prints of each NAME, what it is, and between which limits u has to stay.
+#include <cmath>
 #include <cstdio>
 #include <esokit/adapter/delayed_input.hpp>
-#include <esokit/adapter/guarded.hpp>
 #include <esokit/adapter/known_model.hpp>
 #include <esokit/adapter/mapped_input.hpp>
 #include <esokit/adapter/measured.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
-#include <esokit/control/disturbance_compensator.hpp>
-#include <esokit/control/health.hpp>
-#include <esokit/control/predictive_adrc.hpp>
 #include <esokit/control/smooth_profile.hpp>
 #include <esokit/control/time_proportioned.hpp>
-#include <esokit/observer/adjustable_bandwidth_eso.hpp>
-#include <esokit/observer/algebraic_eso.hpp>
-#include <esokit/observer/cascade_eso.hpp>
-#include <esokit/observer/extended_state_filter.hpp>
-#include <esokit/observer/half_gain_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
-#include <esokit/observer/model_eso.hpp>
-#include <esokit/observer/nonlinear_eso.hpp>
 #include <esokit/target/c_code.hpp>
 #include <esokit/target/fixed_point.hpp>
-#include <esokit/target/health_code.hpp>
 #include <esokit/target/profile_code.hpp>
 #include <esokit/target/time_proportioned_code.hpp>
 #include <filesystem>
@@ -90,32 +79,14 @@ auto observer_of() {
     if constexpr (requires { config.threshold; }) config.threshold = V(0.05);
     if constexpr (requires { config.period; }) config.period = V(6.2831853);
     if constexpr (requires { config.inputs; }) config.inputs[0] = {V(-3), V(0.003), V(0.002)};
-    if constexpr (requires { config.disturbance_bound; }) {
-      config.disturbance_bound = V(200);
-      config.leak_time = V(2);
-      config.release_samples = 20;
-    }
     if constexpr (requires { config.curve; }) {
       config.curve = decltype(config.curve)::dead_zone(V(0.5), V(0.25));
     }
   } else {
-    if constexpr (requires { config.observer_bandwidth; }) config.observer_bandwidth = V(100);
+    config.observer_bandwidth = V(100);
     config.input_gain = V(50);
     config.sample_time = V(1e-3);
     config.max_gap = 3;
-    if constexpr (requires { config.bandwidth_factor; }) config.bandwidth_factor = V(1.5);
-    if constexpr (requires { config.measurement_variance; }) {
-      config.measurement_variance = V(1e-6);
-      config.disturbance_bounds[Observer::size - 1] = V(0.5);
-      config.inflation = V(0.02);
-    }
-    if constexpr (requires { config.shape.exponent; }) {
-      config.shape.exponent = V(0.5);
-      config.shape.linear_width = V(0.05);
-    }
-    if constexpr (requires { config.model.actuator.time_constant; }) {
-      config.model.actuator.time_constant = V(0.05);
-    }
   }
   return config;
 }
@@ -181,50 +152,7 @@ void write_adapters() {
   write_observer<LinearEso<2, float>>("observer", "`LinearEso<2, float>` alone");
 }
 
-void write_guards() {
-  using Guard = Guarded<LinearEso<2, float>>;
-  write_controller<Adrc<Guard>>("guarded", "`Guarded`");
-  write_controller<Adrc<Guard>>("guarded_by_u", "`Guarded` with its bound in the unit of u", {},
-                                [](auto& config) {
-                                  config.observer.unit = DisturbanceUnit::input;
-                                  config.observer.disturbance_bound = 4;
-                                });
-  write_controller<Adrc<MappedInput<Guard>>>("mapped_guard", "`MappedInput` around `Guarded`");
-  write_observer<Guard>("guard_alone", "`Guarded<LinearEso<2, float>>` alone");
-}
-
-void write_observers() {
-  constexpr ModelParts lag{.order = 1, .actuator = 1};
-  using Filter = ExtendedStateFilter<2, float>;
-  write_controller<Adrc<LinearEso<1, float>>>("first", "`LinearEso<1, float>`");
-  write_controller<Adrc<LinearEso<3, float>>>("third", "`LinearEso<3, float>`");
-  write_controller<Adrc<HalfGainEso<2, float>>>("half", "`HalfGainEso`");
-  write_controller<Adrc<CascadeEso<2, 2, float>>>("cascade", "`CascadeEso<2, 2, float>`");
-  write_controller<Adrc<ModelEso<lag, float>>>("model", "`ModelEso`, a motor lag");
-  write_controller<Adrc<ModelCascadeEso<lag, 2, float>>>("model_cascade", "its cascade of two");
-  write_controller<Adrc<Filter>>("filter", "`ExtendedStateFilter<2, float>`");
-  write_controller<Adrc<Filter>>("frozen", "the same, frozen", {},
-                                 [](auto& config) { config.observer.mode = RiccatiMode::frozen; });
-  write_controller<Adrc<AlgebraicEso<2, float>>>("algebraic", "`AlgebraicEso<2, float>`");
-  write_controller<Adrc<AdjustableBandwidthEso<2, float>>>("adjustable",
-                                                           "`AdjustableBandwidthEso<2, float>`");
-  write_controller<Adrc<NonlinearEso<2, float>>>("nonlinear", "`NonlinearEso<2, float>`");
-}
-
-void write_controllers_of_other_laws() {
-  write_controller<PredictiveAdrc<LinearEso<2, float>>>("predictive",
-                                                        "`PredictiveAdrc<LinearEso<2, float>>`");
-  write_controller<DisturbanceCompensator<LinearEso<2, float>>>("compensator",
-                                                                "`DisturbanceCompensator`");
-}
-
 void write_others() {
-  const auto watched = Adrc<LinearEso<2, float>>::make(config_of<Adrc<LinearEso<2, float>>>());
-  write_as(
-      "monitor", "`HealthMonitor<3, float>`", no_limits, {},
-      HealthMonitor<3, float>::make(
-          {.observer_bandwidth = 100, .sample_time = 1e-3f, .input_range = 4.5f, .noise = 0.01f}),
-      *watched);
   SmoothProfileConfig<2, float> profile{.sample_time = 0.004f};
   profile.limits = {3.0f, 20.0f};
   write_as("profile", "`SmoothProfile<2, float>`", no_limits, {},
@@ -257,21 +185,15 @@ void write_in_integers() {
   const auto loop = config_of<Loop>();
   auto ramp = loop;
   holds_and_ramps(ramp);
-  auto slow = loop;
-  slow.observer.observer_bandwidth = 20;
-  slow.controller_bandwidth = 3;
   write_integers<Loop>("integers", "in integers: the second", "-200\t700", loop);
   write_integers<Loop>("integers_ramp", "in integers: it, limit of rate and start hold",
                        "-200\t700", ramp);
-  write_integers<Loop>("integers_slow", "in integers: it, 5 times slower", "-200\t700", slow);
   write_integers<Loop>("integers_counter", "in integers: it, y a counter of 16 bits", "-200\t700",
                        loop, {.y = {.unit = 6.2831853 / 4096, .most = 40, .counter_bits = 16}});
   write_integers<LinearEso<2>>("integers_alone", "in integers: `LinearEso<2>` alone", no_limits,
                                loop.observer);
   write_integers<LinearEso<2>>("integers_narrow", "in integers: it, 16 bits of innovation",
                                no_limits, loop.observer, {.innovation_bits = 16});
-  write_integers<Adrc<CascadeEso<2, 2>>>("integers_cascade", "in integers: `CascadeEso<2, 2>`",
-                                         "-200\t700", config_of<Adrc<CascadeEso<2, 2>>>());
   write_integers<Adrc<LinearEso<1>>>("integers_first", "in integers: `LinearEso<1>`", "-200\t700",
                                      config_of<Adrc<LinearEso<1>>>());
 }
@@ -283,9 +205,6 @@ int main(int argc, char** argv) {
   folder = argv[1];
   write_controllers();
   write_adapters();
-  write_guards();
-  write_observers();
-  write_controllers_of_other_laws();
   write_others();
   write_in_integers();
   return all_written ? 0 : 1;

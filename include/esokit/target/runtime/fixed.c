@@ -422,9 +422,10 @@ static unsigned wrong_at_edges(esokit_state *o)
   const unsigned longest = (ROWS > 1u) ? ESOKIT_GAP_BRIDGED : 0u;
   unsigned high = 0u;
   unsigned low = 0u;
-  unsigned wrong = (unsigned)within((int64_t)U_MOST + 1, U_MOST, &high) ^ U_MOST_U;
+  const int32_t most = within((int64_t)U_MOST + 1, U_MOST, &high);
+  const int32_t sum = most + within(-(int64_t)U_MOST - 1, U_MOST, &low);
+  unsigned wrong = ((unsigned)most ^ U_MOST_U) | (unsigned)sum;
   unsigned i;
-  wrong |= (unsigned)(within(-(int64_t)U_MOST - 1, U_MOST, &low) + U_MOST);
   wrong |= (high ^ ESOKIT_SATURATED) | (low ^ ESOKIT_SATURATED);
 #if ESOKIT_SETTINGS
   wrong |= esokit_adopt(o, o->settings);
