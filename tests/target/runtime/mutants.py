@@ -23,6 +23,7 @@ ROOT = Path(__file__).resolve().parents[3]
 FILES = ROOT / "include/esokit/target/runtime"
 # The tests near to each file: program, filter. The lightest first.
 NEAR = {
+    "approach.c": [("profile_code", "*Approach*")],
     "angle.c": [("c_running", "*OfAnglesByTurns*")],
     "controller.c": [("c_code", "*OfALinearObserverInFloat:*OfAnObserverAlone:*OfWhatIsSafe"),
                      ("c_kinds", "*OfDelaysAndOtherForms"), ("c_guarded", "*OfPinHoldAndGain"),
