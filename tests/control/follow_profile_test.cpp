@@ -202,6 +202,28 @@ TEST(FollowProfile, GoesWithTheTarget) {
   EXPECT_LT(largest(2, 5 * T), 4 * 25 * third);
 }
 
+/// A target that brakes leaves less to brake with: r comes from behind, and not past it. One that
+/// is faster than the limit, however much, is followed at the limit.
+TEST(FollowProfile, DoesNotOvershootATargetThatBrakes) {
+  for (const double side : {1.0, -1.0}) {
+    constexpr double T = 0.01;
+    auto profile = FollowProfile<2>::make({.limits = {{0, 1}}, .sample_time = T}).value();
+    ASSERT_TRUE(profile.start(-20 * side, 20 * side));
+    double past = -1e9;
+    for (int k = 0; k < 2000; ++k) {
+      const double t = k * T;
+      const double target = side * (20 * t - 0.35 * t * t);
+      ASSERT_TRUE(profile.update({target, side * (20 - 0.7 * t), -0.7 * side}));
+      past = std::max(past, side * (profile.motion()(0) - target));
+    }
+    EXPECT_LT(past, 1e-9);
+    EXPECT_GT(past, -1e-9);
+  }
+  auto profile = FollowProfile<2>::make({.limits = {{2, 1}}, .sample_time = 0.1}).value();
+  for (int k = 0; k < 100; ++k) ASSERT_TRUE(profile.update({1e3 * k, 1e300}));
+  EXPECT_EQ(profile.motion()(1), 2);
+}
+
 /// A target with noise of 1e-6: unfiltered r'' is all noise, with a filter of 8 T the part that
 /// the double pole at 1 - T / h leaves, about (T / h)^2.
 TEST(FollowProfile, FiltersANoisyTarget) {

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <esokit/adapter/mapped_input.hpp>
+#include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/resting.hpp>
@@ -11,6 +12,7 @@
 #include <esokit/observer/linear_eso.hpp>
 #include <support/numbers.hpp>
 #include <support/refusal.hpp>
+#include <vector>
 
 namespace esokit_test {
 namespace control_resting_test {
@@ -344,6 +346,47 @@ TEST(Resting, KeepsTheOrderOfALoop) {
 }
 
 /// An angle by the shorter way; any time between samples; lanes.
+/// What the observer rejects is no measurement: a spike before a gate ends no rest, and an absurd
+/// y, which is wrapped to anywhere, neither ends nor begins one.
+template <class Observer>
+void rejects(const typename Observer::Config& observer, const std::vector<double>& spikes) {
+  SCOPED_TRACE(testing::internal::GetTypeName<Observer>());
+  auto axis = Resting<Adrc<Observer>>::make(
+                  {.controller = {.observer = observer, .controller_bandwidth = 20},
+                   .rest = {.error = 0.1, .time = 0.05}})
+                  .value();
+  for (int k = 0; k < 500; ++k) axis.update(1.01, 1);
+  ASSERT_EQ(axis.mode(), LoopMode::rest);
+  const double u = axis.output();
+  for (const double spike : spikes) {
+    EXPECT_EQ(axis.update(spike, 1), u);
+    EXPECT_TRUE(
+        has(axis.status(), StepStatus::measurement_rejected | StepStatus::outlier_rejected));
+    EXPECT_EQ(axis.mode(), LoopMode::rest) << spike;
+    EXPECT_EQ(axis.observer().missed(), 1);
+    EXPECT_EQ(axis.update(1.01, 1), u);
+  }
+  // They are no samples in the band either: it still takes 51 of those.
+  axis.update(1.01, 2);
+  ASSERT_EQ(axis.mode(), LoopMode::running);
+  axis.update(1.01, 1);
+  for (int k = 0; k < 50; ++k) {
+    axis.update(spikes[static_cast<std::size_t>(k) % spikes.size()], 1);
+    EXPECT_EQ(axis.mode(), LoopMode::running) << k;
+    axis.update(1.01, 1);
+    axis.update(1.01, 1);
+    if (k == 20) break;
+  }
+  for (int k = 0; k < 60; ++k) axis.update(1.01, 1);
+  EXPECT_EQ(axis.mode(), LoopMode::rest);
+}
+TEST(Resting, WhatIsRejectedIsNoMeasurement) {
+  const LinearEso<2>::Config eso{.observer_bandwidth = 50, .input_gain = 50, .sample_time = T};
+  rejects<OutlierGate<LinearEso<2>>>({.observer = eso, .threshold = 0.5}, {3, -40});
+  rejects<WrappedOutput<LinearEso<2>>>({.observer = eso, .period = 6}, {1e17, 3e18, -1e300});
+  rejects<LinearEso<2>>(eso, {1.7e308});
+}
+
 TEST(Resting, AroundAdaptersAndInLanes) {
   using Turning = Resting<Adrc<WrappedOutput<VariableTime<LinearEso<2>>>>>;
   auto c = Turning::make(

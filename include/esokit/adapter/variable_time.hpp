@@ -101,8 +101,8 @@ requires(detail::restarts<Observer>()) class VariableTime
     return VariableTime(*observer, config, longest * (S(1) + S(4) * detail::rounding<S>()));
   }
 
-  /// Sets the length of the next steps (s), until the next call. A length outside T / ratio .. T
-  /// ratio is refused, and the last one is kept.
+  /// Sets the length of the next steps (s), until the next call: all that has passed, also what
+  /// `elapsed` kept. A length outside T / ratio .. T ratio is refused, and the last one is kept.
   Check<S> set_step_time(const S& seconds) noexcept {
     const S nominal = chain_config<Observer>(config_.observer).sample_time;
     const S shortest = nominal / config_.ratio;
@@ -114,6 +114,7 @@ requires(detail::restarts<Observer>()) class VariableTime
       return Error<S>{"step_time", seconds, "must be at most", -1, longest, true};
     }
     step_time_ = seconds;
+    kept_ = {};
     return {};
   }
 

@@ -222,6 +222,10 @@ requires(detail::goes_into_a_loop<Observer>()) class Adrc {
     weights_ = fresh.weights_;
     soft_.adopt(fresh.soft_);
     spec_ = fresh.spec_;
+    // Time that has passed counts under the new settings, too.
+    if constexpr (observer_traits<Observer>.varies_time) {
+      (void)with_gains([](Loop&) { return Check<S>{}; });
+    }
     return {};
   }
 
@@ -237,9 +241,8 @@ requires(detail::goes_into_a_loop<Observer>()) class Adrc {
   /// nothing. The observer's gains, the rate limit (for one step, also after a pause) and, if
   /// placed in the sampled domain, the controller's gains follow.
   ///
-  /// It belongs right before its `update`: another `elapsed`, `retune` or `adopt` in between
-  /// replaces it. If the scalar cannot hold the rate limit over it, it is refused and does not
-  /// count.
+  /// Said twice before an `update`, both count; a `retune` in between changes nothing of it. If the
+  /// scalar cannot hold the rate limit over it, it is refused and does not count.
   template <class O = Observer>
   requires(observer_traits<O>.varies_time) Check<S> elapsed(const S& seconds)
   noexcept {

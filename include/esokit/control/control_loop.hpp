@@ -326,6 +326,7 @@ class ControlLoop {
   /// Takes over the settings of `fresh`; state, output and mode are kept. If the observer refuses
   /// them, nothing changes.
   Check<S> adopt(const ControlLoop& fresh) {
+    [[maybe_unused]] const S due = unanswered();
     if (auto ok = observer_.adopt(fresh.observer_); !ok) return ok;
     requested_ = output();
     limiter_.adopt(fresh.limiter_, requested_);
@@ -333,6 +334,10 @@ class ControlLoop {
     if (set_.divider != fresh.set_.divider) phase_ = 0;
     set_ = fresh.set_;
     set_mode(mode_);
+    if constexpr (has_step_time) {
+      steps_.asked = 0;
+      if (due > S(0)) (void)elapsed(due);
+    }
     return {};
   }
 
@@ -342,9 +347,10 @@ class ControlLoop {
   requires(observer_traits<O>.varies_time) Check<S> elapsed(const S& seconds)
   noexcept {
     O next = observer_;
-    const auto steps = next.elapsed(seconds);
+    // What is no time is refused as it is.
+    const auto steps = next.elapsed(seconds < S(0) ? seconds : S(seconds + unanswered()));
     if (!steps) return steps.error();
-    return take_time(next, *steps);
+    return take_time(next, *steps, true);
   }
 
   /// Sets the length of the next steps (s) if the observer is VariableTime; the rate limit follows.
@@ -354,7 +360,7 @@ class ControlLoop {
   noexcept {
     O next = observer_;
     if (auto ok = next.set_step_time(seconds); !ok) return ok;
-    return take_time(next, 1);
+    return take_time(next, 1, false);
   }
 
   /// The observer, for its estimates.
@@ -397,6 +403,7 @@ class ControlLoop {
   /// Steps that the next one consists of, by the time that has passed; 0: too little for one.
   struct Steps {
     std::uint16_t due = 1;
+    std::uint16_t asked = 0;  ///< 1: by `elapsed`, and none of them is done
   };
   struct OneStep {};
   /// What a retune replaces.
@@ -431,16 +438,25 @@ class ControlLoop {
     if (hold_samples > 0) limiter_.track(requested_ = limiter_.within(set_.hold_input));
   }
 
+  /// The time of an `elapsed` that no step has answered yet, s: with other settings, or with more
+  /// time, it is said again.
+  [[nodiscard]] S unanswered() const noexcept {
+    if constexpr (has_step_time) {
+      if (steps_.asked != 0) return static_cast<S>(steps_.due) * observer_.step_time();
+    }
+    return S(0);
+  }
+
   /// What follows from the step time of `next`, the observer.
   template <class O>
-  Check<S> take_time(const O& next, int steps) noexcept {
+  Check<S> take_time(const O& next, int steps, bool asked) noexcept {
     if (steps > 0) {
       const auto limiter = Limiter<S>::make(set_.limits, next.step_time());
       if (!limiter) return limiter.error();
       limiter_.adopt(*limiter, output());
     }
     observer_ = next;
-    steps_.due = static_cast<std::uint16_t>(steps);
+    steps_ = {static_cast<std::uint16_t>(steps), static_cast<std::uint16_t>(asked ? 1 : 0)};
     set_mode(mode_);
     return {};
   }
@@ -469,6 +485,7 @@ class ControlLoop {
       observe_specially<Advanced>(measured, drive);
       return put_out(law);
     }
+    if constexpr (has_step_time) steps_.asked = 0;
     const StepStatus status = observe<Advanced>(measured, drive);
     status_ = status;
     if (status != StepStatus::ok) [[unlikely]] {
@@ -542,6 +559,7 @@ class ControlLoop {
   /// All steps since the last one, but for the one that is to follow.
   void pass_pause([[maybe_unused]] S drive) noexcept {
     if constexpr (has_step_time) {
+      steps_.asked = 0;
       if (steps_.due == 1) return;
       for (; steps_.due > 1; --steps_.due) (void)observer_.predict(drive);
       set_mode(mode_);

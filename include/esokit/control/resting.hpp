@@ -104,7 +104,14 @@ requires(detail::can_rest<Controller>()) class Resting {
 
   /// One sample, as of the controller.
   S update(S y, const Reference& reference) noexcept {
+    const Resting before = *this;
     judge(y, reference);
+    const S u = controller_.update(y, reference);
+    constexpr auto lost = StepStatus::measurement_rejected | StepStatus::outlier_rejected;
+    if (!is_finite(y) || !has(controller_.status(), lost)) return u;
+    // What the observer does not take, as a spike before an OutlierGate, is no measurement here.
+    *this = before;
+    judge(std::numeric_limits<S>::quiet_NaN(), reference);
     return controller_.update(y, reference);
   }
 
