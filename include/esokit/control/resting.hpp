@@ -68,7 +68,8 @@ requires(detail::can_rest<Controller>()) struct RestingConfig {
 /// Around MappedInput give a dead zone a softness of a fourth of its width: of a u that jumps from
 /// one side of it to the other, either would be held (examples/actuator).
 ///
-/// `to_c` does not write it.
+/// `to_c` does not write it: it records what each sample computes, and here a sample may be taken
+/// back.
 template <class Controller>
 requires(detail::can_rest<Controller>()) class Resting {
   using Observer = std::remove_cvref_t<decltype(std::declval<const Controller&>().observer())>;
