@@ -155,6 +155,14 @@ TEST(Clock, SecondsFromZeroAreNeverRefused) {
   EXPECT_TRUE(from_log::judge_clock(clock).doubtful);
   clock.pace = Pace::slow;  // 48 s in minutes is nothing that people set
   EXPECT_FALSE(from_log::judge_clock(clock).doubtful);
+  // 5 ms of a temperature are as likely 0.3 s in minutes, 12.5 ms 45 s in hours.
+  for (const double T : {0.005, 0.0125}) {
+    clock = read(written(0, 1, T, 2000, 4));
+    EXPECT_FALSE(from_log::judge_clock(clock).doubtful) << T;
+    clock.pace = Pace::slow;
+    EXPECT_EQ(from_log::judge_clock(clock).unit, 1) << T;
+    EXPECT_TRUE(from_log::judge_clock(clock).doubtful) << T;
+  }
   clock = read(written(0, 1, 0.02, 2000, 4));
   EXPECT_TRUE(from_log::judge_clock(clock).doubtful);  // 1.2 s in minutes
   clock.pace = Pace::quick;

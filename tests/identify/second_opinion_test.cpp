@@ -40,6 +40,35 @@ SecondOpinion opinion(const FitData& data, const FitPoint& at) {
   return esokit::second_opinion(data, {1, 1, true}, bounds, at, 0.1 * bounds.bandwidth_min);
 }
 
+// Single steps, each a short piece, and one load: y has settled in the rows that a u of zeros would
+// leave.
+TEST(SecondOpinion, WhatIsLeftWithoutUIsOfTheSameRows) {
+  FitData data;
+  data.sample_time = T;
+  data.starts.clear();
+  data.one_load = true;
+  esokit::sim::Gaussian gaussian(4);
+  for (const double level : {3.0, -2.0, 5.0, 1.5, -4.0, 6.0}) {
+    data.starts.push_back(data.y.size());
+    double y = 0;
+    for (int k = 0; k < 190; ++k) {
+      const double u = k < 15 ? 0 : level;
+      data.u.push_back(u);
+      data.y.push_back(y + 0.1 * gaussian.next());
+      y += (1 - std::exp(-30 * T)) / 30 * (b0 * u - 30 * y);
+    }
+  }
+  const auto bounds = esokit::detail::fit_bounds(data, false);
+  // Also where the filter follows all that is slow.
+  for (const double bandwidth : {0.1 * bounds.bandwidth_min, 3.0}) {
+    const SecondOpinion found =
+        esokit::second_opinion(data, {1, 1, true}, bounds, {1, 2 * T, 0.5, 30}, bandwidth);
+    EXPECT_GT(found.explained, 0.8) << bandwidth;
+    EXPECT_LT(found.explained, 1) << bandwidth;
+    EXPECT_NEAR(found.input_gain.value, b0, found.input_gain.half_width) << bandwidth;
+  }
+}
+
 TEST(SecondOpinion, FindsB0FromAnyStart) {
   const FitData data = machine(3, 0.5);
   const auto bounds = esokit::detail::fit_bounds(data, false);

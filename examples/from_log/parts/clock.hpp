@@ -183,6 +183,8 @@ inline bool rival(const ClockRead& read, double unit) {
   const double T = read.step * unit;
   if (!read.steady || !chosen(T)) return false;
   if (unit < 0.5) return read.pace != Pace::slow && unit > 0.5e-3 && T > 0.49e-4 && T < 1;
+  // Of a temperature, rows of ms in seconds are less likely than usual ones in minutes or hours.
+  if (read.pace == Pace::slow && !usual_rows(read.step, read.pace)) return usual_rows(T, read.pace);
   // Minutes count what is a second apart, hours and days a minute.
   const double least = unit > 3599 ? 60 : 1;
   return read.pace != Pace::quick && unit > 1.5 && T > 0.99 * least;

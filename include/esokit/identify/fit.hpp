@@ -37,6 +37,10 @@ class InnovationsFit {
   /// given.
   [[nodiscard]] Fit at(const FitPoint& point);
 
+  /// From now on u explains nothing: what is left without it, over the same rows. A u of zeros
+  /// would leave out other rows at the start of a piece.
+  void ignore_input();
+
   /// Minimises the innovations, from `start` on. @param with_bandwidth false: w is kept
   [[nodiscard]] Fit minimise(const FitPoint& start, bool with_bandwidth, int steps = 25);
 
@@ -138,6 +142,7 @@ class InnovationsFit {
   FitModel model_;
   FitBounds bounds_;
   std::vector<std::size_t> lead_{};             // unused rows at the start of each piece
+  double input_ = 1.0;                          // of u: 0 if it is ignored
   std::size_t rows_ = 0;                        // number of innovations used
   std::vector<std::vector<double>> columns_{};  // of y, u, and the data's columns
   std::vector<double> residual_{};

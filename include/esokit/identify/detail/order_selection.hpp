@@ -34,6 +34,16 @@ bool stops(const std::vector<double>& speed);
 /// The data with an added column for friction, tanh(speed / scale).
 FitData with_friction(const FitData& data, const std::vector<double>& speed, double scale);
 
+/// A fit with friction, and its scale v_s.
+struct RubbedFit {
+  double scale = 0.0;
+  Fit fit{};
+};
+
+/// The fit with friction that starts from the one without, with the scale that leaves least.
+RubbedFit rubbed_fit(const FitData& data, const std::vector<double>& speed, const FitModel& model,
+                     const FitBounds& bounds, const Fit& without, bool with_bandwidth);
+
 /// A force that depends on the position, such as gravity or a spring: y, y^2 and y^3 as columns.
 /// Without it b0 is wrong below the frequencies of the motion, by the same amount at every
 /// bandwidth there: a plateau at a wrong b0.

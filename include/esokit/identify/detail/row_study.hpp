@@ -50,6 +50,10 @@ class RowStudy {
   void find_late_columns(const OrderFit& with, bool search);
   void find_position_force(std::vector<OrderFit>& of_speed);
   void find_disturbance();
+  /// Friction of order 1 that the likelihood misses. At its bandwidth, what turns round now and
+  /// then is a disturbance; at that of the plateau, b0 would have to follow it. It has to leave
+  /// less than `friction_left` of the mean square, and its interval must not reach to zero.
+  void find_plateau_with_friction();
   void find_plateau_in_motion();
   [[nodiscard]] double friction_spread() const;
   [[nodiscard]] double position_spread() const;

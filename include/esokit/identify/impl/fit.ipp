@@ -40,6 +40,11 @@ ESOKIT_FUNCTION InnovationsFit::InnovationsFit(const FitData& data, const FitMod
   }
 }
 
+ESOKIT_FUNCTION void InnovationsFit::ignore_input() {
+  input_ = 0.0;
+  unknown_.clear();
+}
+
 ESOKIT_FUNCTION Fit InnovationsFit::at(const FitPoint& point) {
   Fit fit;
   fit.at = point;
@@ -359,7 +364,7 @@ void InnovationsFit::solve_linear(const Filter& filter, Fit& fit) {
   // y and u in parallel, because a processor can compute both at once.
   filter.template run<2>(
       data_, lead_, data_.u, [](std::size_t run) { return run == 0 ? 1.0 : 0.0; },
-      [](std::size_t run) { return run == 1 ? 1.0 : 0.0; }, nothing,
+      [this](std::size_t run) { return run == 1 ? input_ : 0.0; }, nothing,
       {columns_[0].data(), columns_[1].data()});
   std::size_t next = 2;
   for (const auto& input : data_.inputs) {

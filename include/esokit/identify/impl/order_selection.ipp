@@ -164,6 +164,33 @@ ESOKIT_FUNCTION double criterion(const Fit& fit, int parameters) {
   return rows * std::log(fit.mean_square) + parameters * std::log(rows);
 }
 
+ESOKIT_FUNCTION RubbedFit rubbed_fit(const FitData& data, const std::vector<double>& speed,
+                                     const FitModel& model, const FitBounds& bounds,
+                                     const Fit& without, bool with_bandwidth) {
+  const double size = rms(speed);
+  RubbedFit best{0.0, without};
+  // Friction changes the other parameters, and they change its scale: repeated twice.
+  for (int pass = 0; pass < 2; ++pass) {
+    double least = std::numeric_limits<double>::infinity();
+    const auto attempt = [&](double scale) {
+      const FitData rubbed = with_friction(data, speed, scale);
+      InnovationsFit fit(rubbed, model, bounds);
+      const double square = fit.at(best.fit.at).mean_square;
+      if (square < least) least = square, best.scale = scale;
+    };
+    for (const double share : friction_scales) attempt(share * size);
+    for (double factor = std::sqrt(2.0); factor > 1.05; factor = std::sqrt(factor)) {
+      const double middle = best.scale;
+      attempt(middle * factor);
+      attempt(middle / factor);
+    }
+    const FitData rubbed = with_friction(data, speed, best.scale);
+    InnovationsFit fit(rubbed, model, bounds);
+    best.fit = fit.minimise(best.fit.at, with_bandwidth, 8);
+  }
+  return best;
+}
+
 /// The best fit of one order, with friction if that improves it.
 /// @param before the fit of this order before sines were added, from which this one starts; or none
 inline OrderFit fit_order(const FitData& data, const IdentifyOptions& options, int order,
@@ -185,27 +212,7 @@ inline OrderFit fit_order(const FitData& data, const IdentifyOptions& options, i
   const auto speed = friction_speed(data, order, result.fit.noise, result.fit.at.latency);
   const double size = rms(speed);
   if (!(size > 0.0)) return result;
-  Fit best = result.fit;
-  double best_scale = 0.0;
-  // Friction changes the other parameters, and they change its scale: repeated twice.
-  for (int pass = 0; pass < 2; ++pass) {
-    double least = std::numeric_limits<double>::infinity();
-    const auto attempt = [&](double scale) {
-      const FitData rubbed = with_friction(data, speed, scale);
-      InnovationsFit fit(rubbed, result.model, bounds);
-      const double square = fit.at(best.at).mean_square;
-      if (square < least) least = square, best_scale = scale;
-    };
-    for (const double share : friction_scales) attempt(share * size);
-    for (double factor = std::sqrt(2.0); factor > 1.05; factor = std::sqrt(factor)) {
-      const double middle = best_scale;
-      attempt(middle * factor);
-      attempt(middle / factor);
-    }
-    const FitData rubbed = with_friction(data, speed, best_scale);
-    InnovationsFit fit(rubbed, result.model, bounds);
-    best = fit.minimise(best.at, true, 8);
-  }
+  const auto [best_scale, best] = rubbed_fit(data, speed, result.model, bounds, result.fit, true);
   const FitData rubbed = with_friction(data, speed, best_scale);
   InnovationsFit fit(rubbed, result.model, bounds);
   // Further starts, because the missing friction may have misled the first fit.

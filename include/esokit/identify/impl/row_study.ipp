@@ -195,7 +195,28 @@ ESOKIT_FUNCTION void RowStudy::find_plateau_of_b0() {
                        result_.plateau.points[result_.plateau.middle].fit, lowest);
   }
   of_all_ = result_.plateau;
+  find_plateau_with_friction();
   find_plateau_in_motion();
+}
+
+/// Largest share of the mean square that friction of order 1 leaves at the plateau.
+constexpr double friction_left = 0.9;
+
+ESOKIT_FUNCTION void RowStudy::find_plateau_with_friction() {
+  if (model_.order != 1 || !options_.friction || of_all_.middle == 0) return;
+  if (chosen_.friction_scale > 0.0 || !stops(rows_.y)) return;
+  const Fit& plain = of_all_.points[of_all_.middle].fit;
+  const RubbedFit found = rubbed_fit(rows_, speed(), model_, bounds_, plain, false);
+  if (!(found.fit.mean_square < friction_left * plain.mean_square)) return;
+  FitData rubbed = with_friction(rows_, speed(), found.scale);
+  InnovationsFit fit(rubbed, model_, bounds_);
+  Plateau plateau = find_plateau(fit, found.fit);
+  if (plateau.middle == 0) return;
+  const PlateauPoint& point = plateau.points[plateau.middle];
+  if (!(point.fit.linear.back() > student_95(19) * point.errors.linear.back())) return;
+  chosen_.friction_scale = found.scale;
+  used_ = std::move(rubbed);
+  result_.plateau = of_all_ = std::move(plateau);
 }
 
 ESOKIT_FUNCTION void RowStudy::find_plateau_in_motion() {

@@ -36,9 +36,8 @@ ESOKIT_FUNCTION SecondOpinion second_opinion(const FitData& data, const FitModel
   best = fit.minimise(best.at, false);
   best = fit.at(best.at);
   const FitErrors errors = jackknife(fit, best, false);
-  FitData rest = data;
-  std::fill(rest.u.begin(), rest.u.end(), 0.0);
-  InnovationsFit without(rest, model, bounds);
+  InnovationsFit without(data, model, bounds);
+  without.ignore_input();
   const double left = without.minimise(best.at, false, 8).mean_square;
   return {{best.linear[0], student_95(19) * errors.linear[0]},
           1.0 - best.mean_square / left,
