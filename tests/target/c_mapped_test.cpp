@@ -29,12 +29,6 @@ static_assert(detail::WatchedController<Adrc<LinearEso<2>>> &&
               !detail::WatchedController<Adrc<Mapped>>);
 
 TEST(CMapped, SaysWhatItDoesNotWrite) {
-  using Third = Adrc<MappedInput<LinearEso<3>>>;
-  EXPECT_EQ(refusal(to_c(Third::make(config<Third>(8)).value(), {})),
-            "soften: is not written for a controller around MappedInput");
-  auto hard = config<Third>(8);
-  hard.soften = false;
-  EXPECT_TRUE(to_c(Third::make(hard).value(), {}).has_value());
   FixedPointOptions counts{};
   counts.y = counts.u = {.unit = 1e-3, .most = 4000};
   const auto fixed = to_fixed_c(Adrc<Mapped>::make(config<Adrc<Mapped>>(8)).value(), counts);
@@ -58,6 +52,20 @@ TEST(CMapped, OfAnyCurve) {
   with(ActuatorCurve<float>::two_gains(1.5F, 0.3F), 1411);
   with(ActuatorCurve<double>::square(3), 1421);
   with(ActuatorCurve<double>::from_table<4>({-3, -1, 0.5, 2}, {-2, -1.5, 0.25, 2.5}), 1431);
+}
+
+/// A law that softens is judged by the u that the actuator would have to put out, not by its
+/// effect.
+TEST(CMapped, OfALawThatSoftens) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  const auto softens = [](auto& settings) { settings.soften = true; };
+  equals_controller<Adrc<MappedInput<LinearEso<3, double>>>>(30000, 1441);
+  equals_changed<Adrc<MappedInput<LinearEso<1, double>>, ErrorBased>>(30000, 1461, "gcc -std=c99",
+                                                                      softens);
+  equals_changed<Adrc<MappedInput<Guarded<LinearEso<2, double>>>>>(30000, 1471, "gcc -std=c99",
+                                                                   softens);
+  equals_changed<Adrc<MappedInput<DelayedInput<LinearEso<2, float>, 3>>>>(30000, 1481,
+                                                                          "gcc -std=c99", softens);
 }
 
 TEST(CMapped, AroundWhatItMayBe) {

@@ -47,6 +47,7 @@ constexpr const char* calls[] = {"restart_at y",
                                  "take_over u",
                                  "within u = -",
                                  "harden",
+                                 "soften u",
                                  "scaled_bound bound = -",
                                  "scale_found change",
                                  "predicted_y x1 x2 x3 u = -",
@@ -162,7 +163,7 @@ detail::RecordedDesign design_of(Random& random) {
     d.loop.divider = is() ? 3 : 1;
     d.softens = !d.compensates && is();
   }
-  if (!d.predictive && !d.softens && is()) {
+  if (!d.predictive && is()) {
     d.map = {{-3, 3}, {-0.5, 0.5}, {{2.5, 1, 1}, {0, 0.125, 8}, {-2.5, 1, 1}}};
   }
   d.options.settings_in_struct = !d.predictive && stands && d.gain_is_kept && !d.softens && is();

@@ -380,6 +380,7 @@ TEST(StructuredText, OfAdapters) {
 TEST(StructuredText, OfTheCurveOfAnActuator) {
   if (!there("python3")) GTEST_SKIP() << "no python3";
   controls<Adrc<MappedInput<LinearEso<2, float>>>>(391);
+  controls<Adrc<MappedInput<LinearEso<3, double>>>>(395);  // it softens
   controls<DisturbanceCompensator<MappedInput<DelayedInput<LinearEso<1, double>, 3>>>>(392);
   controls<Adrc<MappedInput<Guarded<LinearEso<1, double>>>, ErrorBased>>(393);
   observes_in_text<MappedInput<Guarded<LinearEso<2, float>>>>(394);

@@ -462,13 +462,22 @@ requires(detail::goes_into_a_loop<Observer>()) class Adrc {
   [[nodiscard]] ESOKIT_COLD S judged(Given given) noexcept {
     S u = command(given);
     if (all(!soft_.on())) return u;
-    if (const auto designed = soft_.slowness() <= S(1.0); records<S> || !all(designed)) {
-      const S eased = soft_.control(law_, lacks(given));
-      u = select(designed, u, detail::by_present_gain(observer(), eased));
-    }
-    soft_.judge(detail::input_for(observer(), u), loop_.limiter(), step_time());
+    u = eased(u, given);
+    judge(detail::input_for(observer(), u));
     return u;
   }
+
+  /// By the softened law. @param u by the one as designed
+  template <class Given>
+  [[nodiscard]] ESOKIT_INLINE S eased(const S& u, const Given& given) const noexcept {
+    const auto designed = soft_.slowness() <= S(1.0);
+    if (!records<S> && all(designed)) return u;
+    const S less = soft_.control(law_, lacks(given));
+    return select(designed, u, detail::by_present_gain(observer(), less));
+  }
+
+  /// @param u asked of the actuator
+  ESOKIT_INLINE void judge(const S& u) noexcept { soft_.judge(u, loop_.limiter(), step_time()); }
 
   /// For packs, see ControlLoop.
   /// @{

@@ -56,7 +56,7 @@ CCode c_code(const RecordedDesign& design);
 ///   ExtendedStateFilter, recursive and frozen, without a nominal model;
 /// - these in DelayedInput, OutlierGate and WrappedOutput;
 /// - these but AlgebraicEso in KnownModel, if its function is generic;
-/// - these in MappedInput, where the law does not soften (the curve is no setting);
+/// - these in MappedInput (the curve is no setting);
 /// - these in Measured, not around WrappedOutput or another Measured, and not in Guarded;
 /// - LinearEso and CascadeEso in Guarded (a changing b0 unless the law softens);
 /// - Adrc of both forms and DisturbanceCompensator around all of these;

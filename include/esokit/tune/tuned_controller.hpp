@@ -13,6 +13,7 @@
 #include <esokit/observer/model_eso.hpp>
 #include <esokit/tune/tune.hpp>
 #include <numbers>
+#include <type_traits>
 #include <vector>
 
 namespace esokit {
@@ -82,21 +83,13 @@ std::vector<std::complex<double>> placed_poles(const TuneModel& model, const Tun
 
 }  // namespace detail
 
-/// Calls `visit(controller)` with the Adrc of a design for a plant of order `Order`, with the
-/// actuator's limits, and returns its result.
-///
-/// So that fewer types are needed, every design with one level becomes a LinearEso with the poles
-/// of the design (with m = 1 or 2, or with the lag in its model). Its gains equal those of the
-/// design's `code` up to rounding. A cascade becomes a CascadeEso.
-/// @param missing what to do when measurements are missing; if it does not say where u goes, that
-/// is
-///        `model.safe_input()`
-/// @return error for a model of another order, for a design that knows more than the lag (use its
-///         `code`), or from `make`
-/// @tparam S scalar of the controller, double or float
-template <int Order, class S = double, class Visit>
-Check<double> with_controller(const TuneModel& model, const TunedDesign& design, const Visit& visit,
-                              const MissingRule<double>& missing = {}) {
+namespace detail {
+
+/// Calls `visit(config)` with the config of the Adrc of a design, see `with_controller`. It returns
+/// a Check.
+template <int Order, class S, class Visit>
+Check<double> with_config(const TuneModel& model, const TunedDesign& design, const Visit& visit,
+                          const MissingRule<double>& missing) {
   Rules<double> rules;
   rules.all_of(model.validate())
       .demand(model.order == Order,
@@ -114,7 +107,6 @@ Check<double> with_controller(const TuneModel& model, const TunedDesign& design,
           "was not made by tune for a model of this order");
   if (!rules) return rules.error();
   const auto run = [&](auto config) -> Check<double> {
-    using Config = decltype(config);
     config.observer.input_gain = static_cast<S>(model.input_gain.value);
     config.observer.sample_time = static_cast<S>(model.sample_time);
     config.observer.max_gap = model.predicted_samples();
@@ -130,20 +122,17 @@ Check<double> with_controller(const TuneModel& model, const TunedDesign& design,
       config.missing.input = static_cast<S>(missing.input.value_or(model.safe_input()));
     }
     config.soften = design.settings.soften;
-    auto controller = detail::ControllerOf<Config>::make(config);
-    if (!controller) return detail::as_double(controller.error());
-    visit(*controller);
-    return {};
+    return visit(config);
   };
   if (design.levels > 1) {
-    return detail::with_number<2, 3>(design.levels, [&](auto levels) {
+    return with_number<2, 3>(design.levels, [&](auto levels) {
       AdrcConfig<CascadeEso<Order, levels(), S>> config;
       config.observer.observer_bandwidth = static_cast<S>(design.settings.observer_bandwidth);
       config.observer.bandwidth_factor = static_cast<S>(design.settings.bandwidth_factor);
       return run(config);
     });
   }
-  auto poles = detail::placed_poles<Order>(model, design);
+  auto poles = placed_poles<Order>(model, design);
   const auto place = [&](auto& places) {
     for (std::size_t i = 0; i < places.size(); ++i) {
       places[i] = {static_cast<S>(poles[i].real()), static_cast<S>(poles[i].imag())};
@@ -156,11 +145,40 @@ Check<double> with_controller(const TuneModel& model, const TunedDesign& design,
     place(config.observer.poles);
     return run(config);
   }
-  return detail::with_number<1, 2>(design.extension, [&](auto extension) {
+  return with_number<1, 2>(design.extension, [&](auto extension) {
     AdrcConfig<LinearEso<Order, S, extension(), PoleSet>> config;
     place(config.observer.poles);
     return run(config);
   });
+}
+
+}  // namespace detail
+
+/// Calls `visit(controller)` with the Adrc of a design for a plant of order `Order`, with the
+/// actuator's limits, and returns its result.
+///
+/// So that fewer types are needed, every design with one level becomes a LinearEso with the poles
+/// of the design (with m = 1 or 2, or with the lag in its model). Its gains equal those of the
+/// design's `code` up to rounding. A cascade becomes a CascadeEso.
+/// @param missing what to do when measurements are missing; if it does not say where u goes, that
+/// is
+///        `model.safe_input()`
+/// @return error for a model of another order, for a design that knows more than the lag (use its
+///         `code`), or from `make`
+/// @tparam S scalar of the controller, double or float
+template <int Order, class S = double, class Visit>
+Check<double> with_controller(const TuneModel& model, const TunedDesign& design, const Visit& visit,
+                              const MissingRule<double>& missing = {}) {
+  return detail::with_config<Order, S>(
+      model, design,
+      [&](const auto& config) -> Check<double> {
+        using Config = std::remove_cvref_t<decltype(config)>;
+        const auto controller = detail::ControllerOf<Config>::make(config);
+        if (!controller) return detail::as_double(controller.error());
+        visit(*controller);
+        return {};
+      },
+      missing);
 }
 
 }  // namespace esokit

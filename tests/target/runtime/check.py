@@ -46,7 +46,6 @@ def valid(has):
         or ("SETTINGS" in has and (not kept or "SOFTENS" in has))
         or ("RECOVERS" in has and "TABLE" not in has)
         or ("SOFTENS" in has and "COMPENSATOR" in has)
-        or {"MAPPED", "SOFTENS"} <= has
         or ("KNOWN" in has and "SCHEDULE" in has)
         or ("MOVES" in has and ("ERROR_BASED" in has or "COMPENSATOR" in has or
                                 not (loop or "PREDICTIVE" in has)))

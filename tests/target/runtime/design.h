@@ -178,6 +178,7 @@ typedef double real;
   bool take_over(esokit_state *o, real u); \
   bool within(const esokit_state *o, real u, real *u_out); \
   bool harden(esokit_state *o); \
+  bool soften(esokit_state *o, real u); \
   bool law_for(const esokit_state *o, DESIGN_R, real e0, real e1, real e2, real *u_out); \
   DESIGN_LAW bool scaled_bound(const esokit_state *o, real bound, real *u_out); \
   bool scale_found(esokit_state *o, real change); \

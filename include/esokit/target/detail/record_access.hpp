@@ -49,11 +49,11 @@ struct RecordAccess {
   template <class C, class Given>
   static auto law(C& c, const Given& reference) noexcept {
     c.loop_.mode_ = LoopMode::running;
-    if constexpr (requires { c.judged(reference); }) {
-      return c.judged(reference);
-    } else {
-      return c.command(reference);
+    const auto u = c.command(reference);
+    if constexpr (requires { c.soft_; }) {
+      if (!all(!c.soft_.on())) return c.eased(u, reference);
     }
+    return u;
   }
   /// The output of the loop for a u that is wanted.
   template <class Loop, class S>
@@ -67,6 +67,11 @@ struct RecordAccess {
     } else {
       return false;
     }
+  }
+  /// Softens the law by the u that it asks for.
+  template <class C, class S>
+  static void soften(C& c, const S& u) noexcept {
+    if constexpr (requires { c.soft_; }) c.judge(u);
   }
   /// The law as designed again.
   template <class C>

@@ -505,6 +505,10 @@ template <class Bare, class BareObserver>
       Access::harden(c);
       return Numbers{};
     });
+    maker.add("soften", "u", false, [](auto& c, const Numbers& in) {
+      Access::soften(c, in[0]);
+      return Numbers{};
+    });
   }
   const auto name_of = [](const auto& c, const Number* at) -> std::string {
     // The limiter keeps the bounds of the next output behind the last.
@@ -548,10 +552,6 @@ Expected<RecordedDesign, Error<typename C::scalar_type>> recorded_design(
   take_rate(design, controller.limiter());
   take_adapters(design, controller.observer());
   design.law = Access::law_numbers(Access::core(bare.observer()));
-  if (design.softens && !design.map.lines.empty()) {
-    return Error<V>{"soften", V(1), "is not written for a controller around MappedInput"};
-  }
-
   if constexpr (requires { controller.gains(); }) {
     for (const V& k : controller.gains()) design.law_gains.push_back(static_cast<double>(k));
   }

@@ -112,6 +112,9 @@ static real wanted(esokit_state *o, DESIGN_R)
 #if ESOKIT_MAPPED
   u = input_for(u);
 #endif
+#if ESOKIT_SOFTENS
+  (void)soften(o, u);
+#endif
   return u;
 }
 
