@@ -392,6 +392,47 @@ TEST(Health, ALimitBehindTheLawIsOne) {
   }
 }
 
+/// A loop whose law asks for `beyond` more than goes out, of a machine at y(k).
+template <class Y>
+Health<double> asked_beyond(double beyond, int samples, const Y& y) {
+  Loop<double>::Config config{};
+  config.observer.observer = {
+      .observer_bandwidth = omega_o, .input_gain = 20, .sample_time = sample_time};
+  config.controller_bandwidth = 20;
+  config.limits = {.lower = -1e6, .upper = 1e6};
+  config.missing.most = 2;
+  auto loop = Loop<double>::make(config).value();
+  auto monitor = monitor_of();
+  for (int k = 0; k < samples; ++k) {
+    const double now = y(k);
+    (void)loop.applied(loop.update(std::abs(now), 0.0) - (now < 0 ? 0.0 : beyond));
+    monitor.look(loop);
+  }
+  return monitor.health();
+}
+
+/// What counts as a limit: more than rounding, and not without the law.
+TEST(Health, ALimitIsMoreThanRounding) {
+  const auto still = [](int) { return 0.0; };
+  EXPECT_NEAR(asked_beyond(1e-3, 5000, still).side, 1, 0.01);
+  EXPECT_NEAR(asked_beyond(-1e-3, 5000, still).side, -1, 0.01);
+  EXPECT_EQ(asked_beyond(1e-5, 5000, still).saturated, 0);
+  EXPECT_LT(asked_beyond(0.5, 5000, [](int) { return hidden_nan<double>(); }).saturated, 0.01);
+}
+
+/// The share of it counts by the memory (1000 samples), the way of y by an eighth of that.
+TEST(Health, TheWayOfYHasAMemory) {
+  const auto turns = [](int k) { return 1 + 1e-3 * (k < 1000 ? k : 2000 - k); };
+  EXPECT_NEAR(asked_beyond(0.5, 100, turns).underway, 0.09, 0.02);
+  const double before = asked_beyond(0.5, 1000, turns).underway;
+  EXPECT_NEAR(before, 0.63, 0.02);
+  EXPECT_GT(asked_beyond(0.5, 1060, turns).underway, before);
+  EXPECT_LT(asked_beyond(0.5, 1200, turns).underway, before);
+  // Before there was a limit (y is marked by its sign), y moves, too.
+  const auto later = [](int k) { return k < 1000 ? -1 - 1e-3 * k : 3 - 1e-3 * k; };
+  EXPECT_LT(asked_beyond(0.5, 2000, later).underway, -0.4);
+}
+
 /// y' = b u - a y + load, or the same of y'' (order 2), driven by a u that stands at a limit.
 template <int Order, class S>
 LoopFault at_a_limit(double b, double r, double load, double seconds) {
