@@ -26,8 +26,8 @@ requires(detail::is_a_plain_scalar<S>()) struct FollowProfileConfig {
 };
 
 /// Follows a target that may change at each sample, from any state, in the least time within the
-/// limits: `update(target)` once a sample, then `motion()` is (r, r', .., r^(n)) for a law of order
-/// n.
+/// limits. Call `update(target)` once a sample; then `motion()` is (r, r', .., r^(n)) for a law of
+/// order n.
 ///
 ///     profile.update({position, speed});        // of what it follows; a number: it stands still
 ///     u = controller.update(y, profile.motion());
@@ -41,8 +41,8 @@ requires(detail::is_a_plain_scalar<S>()) struct FollowProfileConfig {
 /// fast as the acceleration allows. A target that is too fast is followed at the limit.
 ///
 /// Order 2 is the filter of R. Zanasi, C. Guarino Lo Bianco, A. Tonielli, Nonlinear filters for the
-/// generation of smooth trajectories, Automatica 36 (2000): with the distance z = e - T e' / 2 and
-/// the speed e' from the target, and d = A h^2,
+/// generation of smooth trajectories, Automatica 36 (2000). With the distance z = e - T e' / 2 and
+/// the speed e' from the target, and d = A h^2:
 ///
 ///     y = (z + h e') / d,  m = floor((1 + sqrt(1 + 8 |y|)) / 2)
 ///     r'' = -A sat(h e' / d + y / m + sign(y) (m - 1) / 2)
