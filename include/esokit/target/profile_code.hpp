@@ -182,7 +182,7 @@ Expected<std::string, Error<S>> to_structured_text(const SmoothProfile<Order, S>
 }
 
 /// A profile towards any target as C99: `name_start` at rest at y under u, then `name_update` once
-/// a sample, `name_motion` for (r, r') or (r, r', r''), and `name_feed`, the u to add to that of
+/// a sample. `name_motion` gives (r, r') or (r, r', r''), and `name_feed` the u to add to that of
 /// the law. It equals the C++ bit for bit.
 /// @param profile whose settings count, not where it is @return error for the options, as for a
 ///        controller

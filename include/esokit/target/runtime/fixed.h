@@ -105,7 +105,7 @@ unsigned esokit_adopt(esokit_state *o, const esokit_settings *settings);
 int32_t esokit_estimate(const esokit_state *o, unsigned row);
 
 #ifdef ESOKIT_SELF_TEST
-/* 0, or the number of the first sample whose result differs from that of the design; one more than
+/* 0, or the number of the first sample whose result differs from that of the design. One more than
  * there are if a count outside its range, a gap or what leads out of it is not taken as such. */
 int esokit_self_test(void);
 #endif
