@@ -39,7 +39,8 @@ struct TrackingDifferentiatorConfig {
 
 /// Tracking differentiator with fhan: r1 follows the reference as fast as |r1''| <= `acceleration`
 /// allows, and r2 = r1'. Because it can always stop in time, it stays r2^2 / (2R) behind a moving
-/// reference: follow that with a FollowProfile. It arrives, and stands still there, however small its steps are beside r.
+/// reference: follow that with a FollowProfile. It arrives, and stands still there, however small
+/// its steps are beside r.
 template <class S = double>
 requires(detail::is_a_scalar<S>()) class TrackingDifferentiator {
  public:
