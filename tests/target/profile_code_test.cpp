@@ -207,6 +207,22 @@ TEST(ProfileCode, EqualsTheApproach) {
   equals_approach<2, 9, double>(14, -40.0, 0.3);
 }
 
+/// Where the samples of its self-test are beyond the scalar.
+TEST(ProfileCode, ATestOfItselfHasNumbers) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  const auto profile = ApproachProfile<1, 0, float>::make({.input_gain = 1e36F,
+                                                           .limits = {.lower = -10, .upper = 10},
+                                                           .bandwidth = 0.1F,
+                                                           .sample_time = 100})
+                           .value();
+  const Folder folder;
+  const Library library(folder, to_c(profile, {.name = "loop"}).value(), "");
+  ASSERT_TRUE(library.loaded());
+  int (*self_test)(float) = nullptr;
+  library.find(self_test, "loop_self_test");
+  EXPECT_EQ(self_test(0), 0);
+}
+
 TEST(ProfileCode, CompilesWithOtherCompilers) {
   const CCode code = to_c(profile<2, float>(), {.name = "move", .comment = "of the axis"}).value();
   EXPECT_NE(code.header.find(" * of the axis\n"), std::string::npos);

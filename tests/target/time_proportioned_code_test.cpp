@@ -1,7 +1,9 @@
 // The C of a time-proportioned output equals it bit for bit: any u, bad ones, a fresh start.
+#include <cmath>
 #include <cstdint>
 #include <esokit/control/time_proportioned.hpp>
 #include <esokit/target/time_proportioned_code.hpp>
+#include <limits>
 #include <target/written.hpp>
 
 namespace esokit_test {
@@ -63,6 +65,22 @@ void equals_output(std::uint64_t seed, double on) {
   }
   EXPECT_GT(ons, 10000);
   EXPECT_LT(ons, 30000);
+  // Where a window takes a sample more: to the last digit, after one that was off, and on.
+  const S range = static_cast<S>(on) - S(0.3);
+  for (int half = 1; half < 64; ++half) {
+    S u = S(0.3) + range * (static_cast<S>(half) / S(64));
+    for (int i = 0; i < 4; ++i) u = std::nextafter(u, -std::numeric_limits<S>::max());
+    for (int i = 0; i < 16; ++i) {
+      mine = fresh;
+      reset(&its);
+      for (int k = 0; i % 2 == 1 && k < 32; ++k) {
+        EXPECT_TRUE(mine.update(static_cast<S>(on)) && update(&its, static_cast<S>(on)));
+      }
+      EXPECT_EQ(mine.update(u), update(&its, u)) << half << ", " << i;
+      EXPECT_TRUE(equal_bits(mine.applied(), applied(&its))) << half << ", " << i;
+      if (i % 2 == 1) u = std::nextafter(u, std::numeric_limits<S>::max());
+    }
+  }
 }
 
 TEST(TimeProportionedCode, EqualsTheOutput) {
@@ -70,6 +88,17 @@ TEST(TimeProportionedCode, EqualsTheOutput) {
   equals_output<double>(1, 100);
   equals_output<double>(2, -7);
   equals_output<float>(3, 1);
+}
+
+/// Where the samples of its self-test are beyond the scalar.
+TEST(TimeProportionedCode, ATestOfItselfHasNumbers) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  const Folder folder;
+  const Library library(folder, to_c(output<float>(-3.3e38), {.name = "loop"}).value(), "");
+  ASSERT_TRUE(library.loaded());
+  int (*self_test)(float) = nullptr;
+  library.find(self_test, "loop_self_test");
+  EXPECT_EQ(self_test(0), 0);
 }
 
 TEST(TimeProportionedCode, CompilesWithOtherCompilers) {

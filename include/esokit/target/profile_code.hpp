@@ -8,6 +8,7 @@
 #include <esokit/control/approach_profile.hpp>
 #include <esokit/control/smooth_profile.hpp>
 #include <esokit/core/expected.hpp>
+#include <esokit/core/scalar.hpp>
 #include <esokit/target/c_code.hpp>
 #include <esokit/target/detail/list_writer.hpp>
 #include <esokit/target/detail/record_access.hpp>
@@ -199,7 +200,8 @@ Expected<CCode, Error<S>> to_c(const ApproachProfile<Order, Capacity, S>& profil
   constexpr std::size_t count = static_cast<std::size_t>(Order) + 1;
   std::vector<std::array<S, count + 2>> vectors;
   for (int k = 0; k < options.self_test_samples; ++k) {
-    const S way = S((k / 40) % 2 == 0 ? 20 : -10) * config.sample_time * numbers.half_speed;
+    const S way = detail::clipped(
+        S(S((k / 40) % 2 == 0 ? 20 : -10) * config.sample_time * numbers.half_speed));
     (void)played.update(way);
     std::array<S, count + 2> sample{way, played.feed()};
     for (int i = 0; i <= Order; ++i) sample[static_cast<std::size_t>(i + 2)] = played.motion()(i);

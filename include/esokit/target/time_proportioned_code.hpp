@@ -5,6 +5,7 @@
 #include <array>
 #include <esokit/control/time_proportioned.hpp>
 #include <esokit/core/expected.hpp>
+#include <esokit/core/scalar.hpp>
 #include <esokit/target/c_code.hpp>
 #include <esokit/target/detail/list_writer.hpp>
 #include <esokit/target/detail/record_access.hpp>
@@ -43,7 +44,9 @@ Expected<CCode, Error<S>> to_c(const TimeProportioned<S>& output, const CodeOpti
   std::vector<std::array<S, 3>> vectors;
   S u = numbers.off;
   for (int k = 0; k < options.self_test_samples; ++k) {
-    if (simulated.begins()) u = numbers.off + range * (S(k % 13) / S(10) - S(1) / S(10));
+    if (simulated.begins()) {
+      u = detail::clipped(S(numbers.off + range * (S(k % 13) / S(10) - S(1) / S(10))));
+    }
     const bool is_on = simulated.update(u);
     vectors.push_back({u, S(is_on ? 1 : 0), simulated.applied()});
   }
