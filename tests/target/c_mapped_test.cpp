@@ -1,4 +1,5 @@
 // The C of what the curve of an actuator is around equals it bit for bit, and what is refused.
+#include <array>
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/guarded.hpp>
 #include <esokit/adapter/mapped_input.hpp>
@@ -52,6 +53,25 @@ TEST(CMapped, OfAnyCurve) {
   with(ActuatorCurve<float>::two_gains(1.5F, 0.3F), 1411);
   with(ActuatorCurve<double>::square(3), 1421);
   with(ActuatorCurve<double>::from_table<4>({-3, -1, 0.5, 2}, {-2, -1.5, 0.25, 2.5}), 1431);
+}
+
+/// A u at a point of the curve is on the line above it, whose rounding there is its own.
+TEST(CMapped, AtThePointsOfACurve) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  using Observer = MappedInput<LinearEso<1, double>>;
+  auto settings = observer_config<Observer>(8);
+  const std::array<double, 9> points{-7.3, -5.1, -3.7, -1.9, 0.3, 1.1, 3.3, 5.9, 7.7};
+  settings.curve = ActuatorCurve<double>::from_table<9>(
+      points, {-3.1, -2.9, -1.3, -0.7, 0.1, 0.9, 1.7, 4.1, 4.3});
+  auto observer = Observer::make(settings).value();
+  const Folder folder;
+  InC<double> in_c(folder, to_c(observer, {.name = "loop"}).value(), false);
+  ASSERT_TRUE(in_c.loaded());
+  for (const double u : points) {
+    EXPECT_EQ(static_cast<unsigned>(observer.reset(0.0)), in_c.reset(0.0));
+    EXPECT_EQ(static_cast<unsigned>(observer.predict(u)), in_c.predict(u));
+    compare_estimates(observer, in_c, 0);
+  }
 }
 
 /// A law that softens is judged by the u that the actuator would have to put out, not by its
