@@ -155,7 +155,7 @@ void equals_approach(std::uint64_t seed, double gain, double pole) {
     S given = target;
     if (random.index(100) == 0)
       given = random.index(4) == 0 ? hidden_nan<S>() : anything<S>(random);
-    if (random.index(1000) == 0 || k == 0) {
+    if (random.index(1000) == 0 || k == 50) {
       S y = static_cast<S>(random.uniform(2970, 3030));
       S u = static_cast<S>(random.uniform(-20, 80));
       if (random.index(3) == 0) (random.index(2) == 0 ? y : u) = anything<S>(random);

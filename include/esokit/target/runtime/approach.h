@@ -36,7 +36,8 @@ typedef struct {
 } esokit_state;
 
 /* At rest at y under u: before the first update, and where an operator hands over; false, and
- * nothing changes, if one is not finite, or so large that what follows is not. */
+ * nothing changes, if one is not finite, or so large that what follows is not. Before the first one
+ * that is true the state has to be all zeros, as a static one is: at rest at zero under u = 0. */
 bool esokit_start(esokit_state *o, real y, real u);
 /* One sample on the way to a target, which may change at any time. False if it is not finite or so
  * large that what follows is not: the last one counts. */

@@ -26,7 +26,8 @@ typedef struct {
   int32_t samples; /* of the move */
 } esokit_state;
 
-/* At rest at `value`; false, and nothing changes, if it is not finite. */
+/* At rest at `value`; false, and nothing changes, if it is not finite. Before the first one that is
+ * true the state has to be all zeros, as a static one is: at rest at zero. */
 bool esokit_reset(esokit_state *o, real value);
 /* One sample on the way to a target; one that changes during a move is taken up at its end. False if
  * it is not finite or too far: a move that runs goes on, another one does not begin. */
