@@ -38,7 +38,7 @@ TEST(TunedCode, IsThereForEachDesign) {
     EXPECT_EQ(in_c.update(1e6f, 0.0f), 4.0f);
     EXPECT_EQ(in_c.update(-1e9f, 0.0f), -5.0f);
     // Around an actuator with a dead zone the limits are of u, those of the model of its effect.
-    const auto curve = ActuatorCurve<>::dead_zone(1);
+    const auto curve = ActuatorCurve<double, 3>::dead_zone(1);
     const auto mapped = tuned_code<1, float>(model, design, curve, {.name = "loop"});
     ASSERT_TRUE(mapped) << mapped.error().rule;
     EXPECT_NE(mapped->structured_text.find("FUNCTION_BLOCK loop"), std::string::npos);
@@ -52,6 +52,7 @@ TEST(TunedCode, IsThereForEachDesign) {
   }
   EXPECT_GT(lags, 0);
   EXPECT_GT(cascades, 0);
+  EXPECT_TRUE(tuned_code<1>(model, tuning.designs[0], {}));
   EXPECT_STREQ(tuned_code<1>(model, tuning.designs[0], {.name = "2"}).error().field, "name");
   const ActuatorCurve<double> falls{.slope_above = -1};
   EXPECT_STREQ(tuned_code<1>(model, tuning.designs[0], falls).error().field, "curve.slope_above");

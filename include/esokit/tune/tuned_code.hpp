@@ -46,18 +46,18 @@ Expected<TunedCode, Error<double>> tuned_code(const TuneModel& model, const Tune
 /// The same for an actuator with a curve, around which the controller has a MappedInput.
 /// @param model of the plant behind the actuator: its b0 and limits are of the effect of u
 /// @param curve of the actuator; the limits of the code are those of u
-template <int Order, class S = double>
+template <int Order, class S = double, int Points>
 Expected<TunedCode, Error<double>> tuned_code(const TuneModel& model, const TunedDesign& design,
-                                              const ActuatorCurve<>& curve,
+                                              const ActuatorCurve<double, Points>& curve,
                                               const CodeOptions& options = {}) {
-  const auto map = ActuatorMap<>::make(curve);
+  const auto map = ActuatorMap<double, Points>::make(curve);
   if (!map) return map.error();
   const auto input = [&](const S& effect) {
     return static_cast<S>(map->input(static_cast<double>(effect)));
   };
-  ActuatorCurve<S> in_scalar{.points = curve.points,
-                             .slope_below = static_cast<S>(curve.slope_below),
-                             .slope_above = static_cast<S>(curve.slope_above)};
+  ActuatorCurve<S, Points> in_scalar{.points = curve.points,
+                                     .slope_below = static_cast<S>(curve.slope_below),
+                                     .slope_above = static_cast<S>(curve.slope_above)};
   for (std::size_t i = 0; i < curve.input.size(); ++i) {
     in_scalar.input[i] = static_cast<S>(curve.input[i]);
     in_scalar.effect[i] = static_cast<S>(curve.effect[i]);
@@ -67,7 +67,7 @@ Expected<TunedCode, Error<double>> tuned_code(const TuneModel& model, const Tune
       model, design,
       [&](const auto& inside) -> Check<double> {
         using Inside = detail::ControllerOf<std::remove_cvref_t<decltype(inside)>>;
-        using Mapped = MappedInput<typename detail::ObserverOfController<Inside>::type>;
+        using Mapped = MappedInput<typename detail::ObserverOfController<Inside>::type, Points>;
         AdrcConfig<Mapped> config;
         config.observer.observer = inside.observer;
         config.observer.curve = in_scalar;
