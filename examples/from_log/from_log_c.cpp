@@ -61,7 +61,8 @@ void write_code(const from_log::Design& design, const std::string& page) {
   if (pasting.order == 1) {
     const auto number = esokit::detail::source;
     recipe = "u is " + name + "_update(.., motion) plus the feed, within " + number(model.u_min) +
-             " .. " + number(model.u_max) + "; then " + name + "_applied gets u without the feed.";
+             " .. " + number(model.u_max) + "; then " + name +
+             "_applied gets u without the feed. While its mode is safe (2), nothing is added.";
     // As pasted: the law may ask for what is added to it, too.
     model.u_min -= pasting.pole_reach;
     model.u_max += pasting.pole_reach;
