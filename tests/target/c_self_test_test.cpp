@@ -117,6 +117,23 @@ void notices(const CCode& code, const std::vector<Change>& changes, Given... giv
   }
 }
 
+/// Where r and the y of its plant are beyond the scalar.
+TEST(CSelfTest, HasNumbers) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  for (const float time : {0.01F, 10.0F}) {
+    const auto controller = Adrc<Observer>::make({.observer = {.observer_bandwidth = 0.1F / time,
+                                                               .input_gain = 1e34F,
+                                                               .sample_time = time},
+                                                  .controller_bandwidth = 0.01F / time,
+                                                  .limits = {.lower = -1e5F, .upper = 1e5F}})
+                                .value();
+    const Folder folder;
+    InC<float> in_c(folder, to_c(controller, {.name = "loop"}).value(), true);
+    ASSERT_TRUE(in_c.loaded()) << time;
+    EXPECT_EQ(in_c.self_test(0), 0) << time;
+  }
+}
+
 TEST(CSelfTest, FailsWhereTheCodeWasChanged) {
   if (!there("gcc")) GTEST_SKIP() << "no gcc";
   notices(to_c(controller<Adrc<Observer>>(), {.name = "loop"}).value(),

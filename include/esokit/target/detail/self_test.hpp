@@ -152,6 +152,8 @@ void take_self_test(RecordedDesign& design, double law, Calls&& calls, Output&& 
       .largest = most,
       .huge = 0.25 * most / (std::max)(1.0, std::abs(design.input_gain)),
       .step = size};
+  // The text has no infinite numbers.
+  const auto number = [most](double x) { return static_cast<V>(std::clamp(x, -most, most)); };
   TestPlant plant(design.order, design.input_gain, design.sample_time);
   for (int k = 0; k < design.options.self_test_samples; ++k) {
     PlannedCall plan = planned(k, numbers);
@@ -163,14 +165,14 @@ void take_self_test(RecordedDesign& design, double law, Calls&& calls, Output&& 
       row = design.order;
     }
     if (std::isnan(plan.y)) plan.y = plant.output();
-    V y = static_cast<V>(plan.y);
+    V y = number(plan.y);
     Vector<V, inputs> beside;
     for (int i = 1; i < inputs; ++i) {
-      beside(i) = static_cast<V>(size * (0.125 * ((k * 11 + i) % 9) - 0.5));
+      beside(i) = number(size * (0.125 * ((k * 11 + i) % 9) - 0.5));
     }
-    beside(0) = static_cast<V>(!std::isnan(plan.beside) ? plan.beside
-                               : (k / 10) % 2 == 0      ? size
-                                                        : -0.5 * size);
+    beside(0) = number(!std::isnan(plan.beside) ? plan.beside
+                       : (k / 10) % 2 == 0      ? size
+                                                : -0.5 * size);
     std::vector<double> sample{static_cast<double>(y)};
     for (const V& one : beside) sample.push_back(static_cast<double>(one));
     if ((plan.bad & bad_y) != 0) y = y * largest;
