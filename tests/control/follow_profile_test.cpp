@@ -269,6 +269,58 @@ TEST(FollowProfile, Retunes) {
   EXPECT_NEAR(profile.motion()(2), 0, 1e-6);
 }
 
+/// Another sample time: what a motion said of r until the next sample stays true, so no limit is
+/// exceeded, and a start stays where it was.
+template <int Order>
+void retunes_the_time(std::uint64_t seed) {
+  Random random(seed);
+  for (int i = 0; i < long_run(200); ++i) {
+    FollowProfileConfig<Order> config{.sample_time = random.log_uniform(1e-4, 1)};
+    config.limits[0] = 2;
+    config.limits[Order - 1] = random.log_uniform(0.1, 10) / config.sample_time;
+    auto profile = FollowProfile<Order>::make(config).value();
+    const double speed = Order == 1 ? 0 : random.uniform(-2, 2);
+    ASSERT_TRUE(profile.start(1, speed));
+    double next = 1, faster = speed, target = 0;
+    for (int k = 0; k < 100; ++k) {
+      config.sample_time *= random.index(3) == 0 ? random.log_uniform(0.1, 10) : 1;
+      config.sample_time = std::clamp(config.sample_time, 1e-5, 10.0);
+      ASSERT_TRUE(profile.retune(config));
+      if (random.index(5) == 0) target = random.uniform(-10, 10);
+      ASSERT_TRUE(profile.update(target));
+      const auto& r = profile.motion();
+      const double T = config.sample_time;
+      const double most = T * config.limits[Order - 1];  // at once, of r or of r'
+      ASSERT_NEAR(r(0), next, 1e-12 * (10 + (1 + T) * most)) << k;
+      if constexpr (Order == 2) {
+        ASSERT_NEAR(r(1), faster, 1e-12 * (1 + most)) << k;
+      }
+      ASSERT_LE(std::abs(r(1)), config.limits[0]) << k;
+      next = r(0) + T * r(1) + (Order == 2 ? T * T / 2 * r(Order) : 0);
+      faster = r(1) + T * r(Order);
+    }
+  }
+}
+TEST(FollowProfile, RetunesItsSampleTime) {
+  retunes_the_time<1>(21);
+  retunes_the_time<2>(22);
+}
+
+/// From so far that the way to brake is millions of samples long, it is still as fast as can be.
+TEST(FollowProfile, CountsNoSamples) {
+  auto profile = FollowProfile<2>::make({.limits = {{100, 1}}, .sample_time = 1e-6}).value();
+  const auto change = [&](double place, double speed) {
+    EXPECT_TRUE(profile.start(place, speed));
+    EXPECT_TRUE(profile.update(0));
+    return profile.motion()(2);
+  };
+  for (const double speed : {1.0, 11.0, 20.0, 90.0}) {
+    EXPECT_EQ(change(-speed * speed / 2 * 1.01, speed), 1);
+    EXPECT_EQ(change(-speed * speed / 2 * 0.99, speed), -1);
+  }
+  EXPECT_EQ(change(-1e6, 100), 0);
+}
+
 /// A joint of order 2 that a brake holds for two seconds while its target goes on. A reference that
 /// waits asks for no more than its limit of speed afterwards, and one that does not has the joint
 /// catch up.
@@ -346,6 +398,25 @@ TEST(FollowProfile, LostTargetsGoOn) {
   EXPECT_EQ(profile.motion()(1), 1);
 }
 
+/// The step of a lost target, too, may be below a digit of where it is.
+template <int Order>
+void goes_on_in_float() {
+  FollowProfileConfig<Order, float> config{.sample_time = 1e-4f};
+  config.limits[0] = 5;
+  config.limits[Order - 1] = 50;
+  auto profile = FollowProfile<Order, float>::make(config).value();
+  ASSERT_TRUE(profile.start(1e4f, 0.5f));
+  ASSERT_TRUE(profile.update({1e4f, 0.5f}));
+  for (int k = 1; k <= 10'000; ++k) {
+    ASSERT_FALSE(profile.update(static_cast<float>(nan)));
+    ASSERT_NEAR(static_cast<double>(profile.motion()(0)), 1e4 + 0.5e-4 * k, 2e-3) << k;
+  }
+}
+TEST(FollowProfile, LostTargetsGoOnInFloat) {
+  goes_on_in_float<1>();
+  goes_on_in_float<2>();
+}
+
 /// In float a step is far below a digit of r; it arrives, and stands still there.
 TEST(FollowProfile, LosesNoSmallStepInFloat) {
   auto profile =
@@ -372,6 +443,7 @@ void stays_finite(std::uint64_t seed) {
     if (random.index(3) == 0) config.filter_time = config.sample_time * any();
     config.limits[0] = random.index(2) == 0 && Order == 2 ? 0.0f : any();
     config.limits[Order - 1] = any();
+    if (random.index(4) == 0) config.limits[Order - 1] = std::numeric_limits<float>::max();
     auto profile = FollowProfile<Order, float>::make(config);
     if (!profile) continue;
     ++made;
@@ -383,7 +455,10 @@ void stays_finite(std::uint64_t seed) {
         config.limits[Order - 1] = any();
         (void)profile->retune(config);
       }
-      (void)profile->update({given(), random.index(2) == 0 ? 0.0f : given()});
+      if (random.index(10) == 0) profile->wait();
+      esokit::Vector<float, Order + 1> target;
+      for (float& x : target) x = random.index(2) == 0 ? 0.0f : given();
+      (void)profile->update(target);
       for (const float x : profile->motion()) ASSERT_TRUE(std::isfinite(x)) << i << ' ' << k;
     }
   }
@@ -439,6 +514,14 @@ TEST(FollowProfile, RefusesByRule) {
             "filter_time: must be 0 or not below sample_time, which is");
   EXPECT_EQ(refused([](auto& c) { c.sample_time = 1e-160; }),
             "limits[1]: times sample_time^n leaves the scalar's range");
+  // Both ends of the range: no limit of acceleration, a second apart, and a millisecond.
+  constexpr double largest = std::numeric_limits<double>::max();
+  EXPECT_EQ(refused([&](auto& c) {
+              c.limits[1] = largest;
+              c.sample_time = 2;
+            }),
+            "limits[1]: times sample_time^n leaves the scalar's range");
+  EXPECT_EQ(refused([&](auto& c) { c.limits[1] = largest; }), "accepted");
   EXPECT_EQ(refusal(FollowProfile<1>::make({.sample_time = 1})),
             "limits[0]: must be finite and positive");
 }

@@ -38,6 +38,15 @@ void loses_nothing() {
   }
 }
 
+TEST(FineSum, DiffersFromAnother) {
+  FineSum<float> sum(1e4f), other(1e4f);
+  for (int k = 0; k < 30; ++k) sum.add(1e-4f);
+  other.add(-2e-4f);
+  EXPECT_NEAR(sum.minus(other), 3.2e-3f, 1e-9f);
+  EXPECT_NEAR(other.minus(sum), -3.2e-3f, 1e-9f);
+  EXPECT_EQ(sum.minus(sum), 0);
+}
+
 TEST(FineSum, LosesNothing) {
   loses_nothing<float>();
   loses_nothing<double>();

@@ -12,6 +12,7 @@
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/snapshot.hpp>
 #include <esokit/math/detail/fine_sum.hpp>
+#include <limits>
 
 namespace esokit {
 
@@ -77,9 +78,11 @@ requires(detail::is_a_plain_scalar<S>()) class FollowProfile {
     if (!rules) return rules.error();
     const FollowProfile profile(config);
     const S h = profile.width();
-    rules.representable("limits", config.limits[Order - 1],
-                        S(config.limits[Order - 1] / S(64) * h * (Order == 1 ? S(1) : h)),
-                        "times sample_time^n leaves the scalar's range", Order - 1);
+    const S way = config.limits[Order - 1] * h * (Order == 1 ? S(1) : h);  // of a sample
+    for (const S& part : {S(S(1) / S(64)), Order == 1 ? S(1) : S(64)}) {
+      rules.representable("limits", config.limits[Order - 1], S(part * way),
+                          "times sample_time^n leaves the scalar's range", Order - 1);
+    }
     if (!rules) return rules.error();
     return profile;
   }
@@ -88,23 +91,21 @@ requires(detail::is_a_plain_scalar<S>()) class FollowProfile {
   /// @return false if it is not finite or too large: then the last one goes on at its speed
   bool update(const Target& target) noexcept {
     const bool good = aim(target);
-    if (!good) (void)aim(Target{S(target_ + config_.sample_time * speed_), speed_});
-    advance();
+    if (!good) aim_on();
     if constexpr (Order == 1) {
-      motion_(1) = within(S(speed_ - r_.minus(target_) / width()), config_.limits[0]);
+      go(within(S(speed_ - r_.minus(target_) / width()), config_.limits[0]));
     } else {
-      motion_(2) = acceleration();
+      go(acceleration());
     }
     return good;
   }
 
   /// One sample in which the axis cannot go on: r comes to rest within the limits.
   void wait() noexcept {
-    advance();
     if constexpr (Order == 1) {
-      motion_(1) = S(0);
+      go(S(0));
     } else {
-      motion_(2) = within(S(-v_.value() / config_.sample_time), config_.limits[1]);
+      go(within(S(-v_.value() / config_.sample_time), config_.limits[1]));
     }
   }
 
@@ -118,27 +119,22 @@ requires(detail::is_a_plain_scalar<S>()) class FollowProfile {
     if (!fits(y, speed)) return false;
     r_ = Sum(y);
     v_ = Sum(Order == 1 ? S(0) : speed);
-    target_ = y;
+    target_ = Sum(y);
     speed_ = thrust_ = S(0);
     motion_ = Motion::Zero();
     motion_(0) = y;
-    if constexpr (Order == 2) {
-      motion_(1) = speed;
-      r_.add(-config_.sample_time * speed);  // the update of this sample advances it
-    }
+    if constexpr (Order == 2) motion_(1) = speed;
     return true;
   }
 
-  /// Other settings while it runs. A refused config changes nothing.
+  /// Other settings, from the next update on. A refused config changes nothing.
   Check<S> retune(const Config& config) { return detail::retune(*this, config); }
 
   /// The same with the settings of `fresh`, as returned by `make`.
   Check<S> adopt(const FollowProfile& fresh) noexcept {
-    const S T = fresh.config_.sample_time;
-    S fastest = detail::absolute(motion_(1));
-    if constexpr (Order == 2) fastest = fastest + T * detail::absolute(motion_(2));
-    if (!fresh.fits(motion_(0), fastest) || !fresh.fits(target_, speed_)) {
-      return Error<S>{"sample_time", T, "and limits do not suit the present motion"};
+    if (!fresh.fits(r_.value(), v_.value()) || !fresh.fits(target_.value(), speed_)) {
+      return Error<S>{"sample_time", fresh.config_.sample_time,
+                      "and limits do not suit the present motion"};
     }
     config_ = fresh.config_;
     return {};
@@ -174,28 +170,37 @@ requires(detail::is_a_plain_scalar<S>()) class FollowProfile {
   bool aim(const Target& target) noexcept {
     const S speed = allowed(target(1));
     if (!is_finite(target(1)) || !is_finite(target(Order)) || !fits(target(0), speed)) return false;
-    target_ = target(0);
+    target_ = Sum(target(0));
     speed_ = speed;
     if constexpr (Order == 2) thrust_ = within(target(2), config_.limits[1]);
     return true;
   }
 
-  /// By a sample, with r^(n) as it was held.
-  void advance() noexcept {
+  /// The last target, a sample later, as long as it is not too far.
+  void aim_on() noexcept {
+    Sum next = target_;
+    next.add(config_.sample_time * speed_);
+    if (fits(next.value(), speed_)) target_ = next;
+    thrust_ = S(0);
+  }
+
+  /// To the next sample, with r^(n) held.
+  void go(const S& highest) noexcept {
     const S T = config_.sample_time;
+    motion_(0) = r_.value();
+    if constexpr (Order == 2) motion_(1) = v_.value();
+    motion_(Order) = highest;
     if constexpr (Order == 1) {
-      r_.add(T * motion_(1));
+      r_.add(T * highest);
     } else {
-      r_.add(T * (v_.value() + T / S(2) * motion_(2)));
-      v_.add(T * motion_(2));
+      r_.add(T * (v_.value() + T / S(2) * highest));
+      v_.add(T * highest);
       // What rounding adds to a limit.
       const S beyond = detail::absolute(v_.value()) - config_.limits[0];
       if (beyond > S(0) && beyond < S(8) * detail::rounding<S>() * config_.limits[0]) {
         v_ = Sum(allowed(v_.value()));
       }
-      motion_(1) = v_.value();
     }
-    motion_(0) = r_.value();
   }
 
   /// r'' for the next sample.
@@ -211,7 +216,7 @@ requires(detail::is_a_plain_scalar<S>()) class FollowProfile {
     S left = taken > S(0) ? S(most - taken) : most;
     if (!(left > most / S(16))) left = most / S(16);
     const S unit = left * h * h;
-    constexpr auto longest = static_cast<S>(std::uint64_t{1} << 46);
+    constexpr S longest = (std::numeric_limits<S>::max)() / S(16);
     S y = detail::absolute(place) / unit;
     if (!(y < longest)) y = longest;
     const S samples = std::floor((S(1) + std::sqrt(S(1) + S(8) * y)) / S(2));
@@ -226,9 +231,9 @@ requires(detail::is_a_plain_scalar<S>()) class FollowProfile {
   }
 
   Config config_;
-  Sum r_{};
-  Sum v_{};  ///< r'
-  S target_{};
+  Sum r_{};  ///< at the next update
+  Sum v_{};  ///< r' then
+  Sum target_{};
   S speed_{};   ///< of the target, within the limit
   S thrust_{};  ///< its acceleration, within the limit
   Motion motion_ = Motion::Zero();

@@ -29,6 +29,9 @@ class FineSum {
   [[nodiscard]] constexpr S value() const noexcept { return whole_ + rest_; }
   /// The sum minus x, with all its digits where it is near x.
   [[nodiscard]] constexpr S minus(const S& x) const noexcept { return (whole_ - x) + rest_; }
+  [[nodiscard]] constexpr S minus(const FineSum& x) const noexcept {
+    return (whole_ - x.whole_) + (rest_ - x.rest_);
+  }
 
  private:
   S whole_{};
