@@ -94,6 +94,39 @@ TEST(FollowProfile, ArrivesAsFastAsTheOptimumAndDoesNotChatter) {
   arrives_in_time(20261128, 0.9);
 }
 
+/// A target that accelerates leaves A - r'' on one side and A + r'' on the other: the optimum of
+/// two parts, again at most 5 % away.
+TEST(FollowProfile, ArrivesInTimeAtATargetThatAccelerates) {
+  Random random(20261129);
+  for (int i = 0; i < long_run(500); ++i) {
+    const double thrust = random.uniform(-0.9, 0.9), speed = random.uniform(-100, 100);
+    const double begin = speed + random.uniform(-50, 50);
+    double e = random.log_uniform(1, 2000) * random.uniform(-1, 1), d = begin - speed;
+    const double place = e;
+    double up = 1 - thrust, down = 1 + thrust;  // of the distance
+    if (e + d * std::abs(d) / (2 * (d > 0 ? down : up)) > 0) {
+      e = -e;
+      d = -d;
+      std::swap(up, down);
+    }
+    // Towards the target, to a peak of speed, and a brake.
+    const double peak = std::sqrt((-e + d * d / (2 * up)) * 2 * up * down / (up + down));
+    const double least = (peak - d) / up + peak / down;
+    if (least < 40) continue;
+    auto profile = FollowProfile<2>::make({.limits = {{0, 1}}, .sample_time = 1}).value();
+    ASSERT_TRUE(profile.start(place, begin));
+    int arrived = -1;
+    for (int k = 0; k < 2 * least; ++k) {
+      const double target = speed * k + thrust * k * k / 2;
+      ASSERT_TRUE(profile.update({target, speed + thrust * k, thrust}));
+      const bool there = std::abs(profile.motion()(0) - target) < 1e-6;
+      arrived = !there ? -1 : arrived < 0 ? k : arrived;
+    }
+    ASSERT_GE(arrived, least - 1e-6) << i;
+    ASSERT_LE(arrived, 1.05 * least) << i;
+  }
+}
+
 /// Targets that jump in each sample, or just where it hurts: no limit is exceeded, and a speed
 /// beyond it only falls, as fast as it can. What motion says is how r goes on.
 template <class S>

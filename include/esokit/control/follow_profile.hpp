@@ -211,17 +211,17 @@ requires(detail::is_a_plain_scalar<S>()) class FollowProfile {
     const S v = v_.value();
     const S faster = v - speed_;
     const S place = r_.minus(target_) - T / S(2) * faster + h * faster;
-    // What is left to brake with, while the target accelerates.
-    const S taken = place > S(0) ? thrust_ : S(-thrust_);
-    S left = taken > S(0) ? S(most - taken) : most;
-    if (!(left > most / S(16))) left = most / S(16);
-    const S unit = left * h * h;
+    // What a target that accelerates leaves to brake with.
+    S share = S(1) - (place > S(0) ? thrust_ : S(-thrust_)) / most;
+    if (!(share > S(1) / S(16))) share = S(1) / S(16);
+    const S unit = share * (most * h * h);
     constexpr S longest = (std::numeric_limits<S>::max)() / S(16);
     S y = detail::absolute(place) / unit;
     if (!(y < longest)) y = longest;
     const S samples = std::floor((S(1) + std::sqrt(S(1) + S(8) * y)) / S(2));
     const S curve = y / samples + (samples - S(1)) / S(2);
-    S a = within(S(thrust_ - left * (h * faster / unit + std::copysign(curve, place))), most);
+    S a = within(S(thrust_ - most * (share * (h * faster / unit + std::copysign(curve, place)))),
+                 most);
     if (const S limit = config_.limits[0]; limit > S(0)) {
       const S up = within(S((limit - v) / T), most);
       const S down = within(S((-limit - v) / T), most);
