@@ -429,6 +429,31 @@ TEST(FollowProfile, LostTargetsGoOn) {
   EXPECT_FALSE(profile.update(nan));
   EXPECT_NEAR(profile.motion()(0), 7, 1e-12);
   EXPECT_EQ(profile.motion()(1), 1);
+  // A start is a target that stands; one that accelerated goes on at its speed.
+  for (int k = 0; k < 100; ++k) EXPECT_FALSE(profile.update(nan));
+  EXPECT_NEAR(profile.motion()(0), 7, 1e-9);
+  ASSERT_TRUE(profile.update({7, 1, 20}));
+  for (int k = 0; k < 100; ++k) EXPECT_FALSE(profile.update(nan));
+  EXPECT_NEAR(profile.motion()(0), 7 + 1, 1e-9);
+  EXPECT_NEAR(profile.motion()(1), 1, 1e-9);
+}
+
+/// However long it is lost, it does not go on beyond the range; nor does a retune bring it there.
+TEST(FollowProfile, LostTargetsStayFinite) {
+  FollowProfileConfig<1, float> config{.limits = {{1e36f}}, .sample_time = 1};
+  auto profile = FollowProfile<1, float>::make(config).value();
+  ASSERT_TRUE(profile.update({0, 1e35f}));
+  for (int k = 0; k < 10'000; ++k) {
+    ASSERT_FALSE(profile.update(static_cast<float>(nan)));
+    for (const float x : profile.motion()) ASSERT_TRUE(std::isfinite(x)) << k;
+  }
+  ASSERT_TRUE(profile.start(0));
+  ASSERT_TRUE(profile.update({0, 1e36f}));
+  config = {.limits = {{1}}, .filter_time = 100, .sample_time = 1};
+  EXPECT_EQ(refusal(profile.retune(config)),
+            "sample_time: and limits do not suit the present motion");
+  config.filter_time = 2;
+  EXPECT_EQ(refusal(profile.retune(config)), "accepted");
 }
 
 /// The step of a lost target, too, may be below a digit of where it is.
@@ -555,6 +580,16 @@ TEST(FollowProfile, RefusesByRule) {
             }),
             "limits[1]: times sample_time^n leaves the scalar's range");
   EXPECT_EQ(refused([&](auto& c) { c.limits[1] = largest; }), "accepted");
+  EXPECT_EQ(refused([&](auto& c) {
+              c.limits[1] = 32 * std::numeric_limits<double>::min();
+              c.sample_time = 1;
+            }),
+            "limits[1]: times sample_time^n leaves the scalar's range");
+  EXPECT_EQ(refused([&](auto& c) {
+              c.limits[1] = 64 * std::numeric_limits<double>::min();
+              c.sample_time = 1;
+            }),
+            "accepted");
   EXPECT_EQ(refusal(FollowProfile<1>::make({.sample_time = 1})),
             "limits[0]: must be finite and positive");
 }
