@@ -520,7 +520,7 @@ void stays_finite(std::uint64_t seed) {
       for (const float x : profile->motion()) ASSERT_TRUE(std::isfinite(x)) << i << ' ' << k;
     }
   }
-  EXPECT_GT(made, 100);
+  EXPECT_GT(made, long_run(1000) / 10);
 }
 TEST(FollowProfile, StaysFinite) {
   stays_finite<1>(11);
