@@ -864,6 +864,19 @@ if [[ -s $objects/libesokit_from_log.a ]]; then
   verdict $? "from_log is $bytes bytes of code in $units units: it takes longer to compile than it did"
 fi
 
+# from_log_c, where it was built: its C compiles, and controller and profile pass their self-tests.
+if [[ -x $(dirname "$program")/from_log_c ]]; then
+  servo >rows.txt
+  written t,y,u , t >turn.csv
+  "$(dirname "$program")/from_log_c" turn.csv --out c >said_c 2>&1 &&
+    printf '%s\n' '#include "c/turn.h"' '#include "c/turn_profile.h"' 'int main(void) {' \
+      '  return turn_self_test(0.0f) != 0 || turn_profile_self_test(0.0f) != 0;' '}' >in_c.c &&
+    "${CC:-cc}" -std=c99 -Wall -Wextra -Wconversion -Werror -DTURN_SELF_TEST \
+      -DTURN_PROFILE_SELF_TEST in_c.c c/turn.c c/turn_profile.c -lm -o in_c 2>>said_c && ./in_c &&
+    [[ -s c/turn.st && -s c/turn_profile.st ]]
+  verdict $? "turn.csv as C: $(tail -n 5 said_c)"
+fi
+
 wait "$pasted"
 verdict $? "what $first says does not compile, check or hold the machine: $(cd pasted && head -n 5 errors;
   cat said_all said_wrong said_play; cat pasted.cpp)"
