@@ -27,10 +27,10 @@
 #include <esokit/analysis/integrator_chain.hpp>
 #include <esokit/analysis/poles.hpp>
 #include <esokit/eigen.hpp>
+#include <esokit/gain/certificate/continuous_certificate.hpp>
+#include <esokit/gain/certificate/switching_certificate.hpp>
 #include <esokit/gain/continuous_gain.hpp>
-#include <esokit/gain/switching_certificate.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
-#include <esokit/sim/continuous_certificate.hpp>
 
 #include "common/parallel.hpp"
 #include "common/report.hpp"

@@ -25,8 +25,8 @@
 #include <vector>
 
 #include <esokit/eigen.hpp>
+#include <esokit/gain/certificate/gain_interval.hpp>
 #include <esokit/gain/continuous_gain.hpp>
-#include <esokit/gain/gain_interval.hpp>
 
 #include "common/report.hpp"
 #include "paper4_nhoeso/paper4.hpp"

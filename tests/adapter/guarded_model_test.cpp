@@ -14,7 +14,7 @@
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
-#include <esokit/gain/gating_certificate.hpp>
+#include <esokit/gain/certificate/gating_certificate.hpp>
 #include <esokit/gain/pole_set.hpp>
 #include <esokit/observer/model_eso.hpp>
 #include <esokit/sim/plant.hpp>

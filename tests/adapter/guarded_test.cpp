@@ -17,7 +17,7 @@
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/eigen.hpp>
-#include <esokit/gain/gating_certificate.hpp>
+#include <esokit/gain/certificate/gating_certificate.hpp>
 #include <esokit/gain/pole_set.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>

@@ -2,8 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <esokit/gain/gain_interval.hpp>
-#include <esokit/sim/continuous_certificate.hpp>
+#include <esokit/gain/certificate/continuous_certificate.hpp>
+#include <esokit/gain/certificate/gain_interval.hpp>
 #include <numbers>
 #include <support/numbers.hpp>
 #include <support/switching.hpp>

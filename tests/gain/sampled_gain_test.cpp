@@ -376,9 +376,9 @@ constexpr esokit::detail::BridgedSteps bridged_steps(int size) {
   }
 }
 
-/// The certificate of gain/detail/bridged_steps.hpp: e' L' L e falls in every step up to the reach.
-/// With one pole at zero the first error is zero after each correction, and L is that of the
-/// others.
+/// The certificate of gain/certificate/detail/bridged_steps.hpp: e' L' L e falls in every step up
+/// to the reach. With one pole at zero the first error is zero after each correction, and L is that
+/// of the others.
 /// @param l upper triangle of L, row by row
 template <class Poles, int Size>
 void falls(const std::vector<double>& l) {

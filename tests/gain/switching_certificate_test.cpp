@@ -4,10 +4,10 @@
 
 #include <cmath>
 #include <complex>
+#include <esokit/gain/certificate/continuous_certificate.hpp>
+#include <esokit/gain/certificate/switching_certificate.hpp>
 #include <esokit/gain/continuous_gain.hpp>
 #include <esokit/gain/pole_set.hpp>
-#include <esokit/gain/switching_certificate.hpp>
-#include <esokit/sim/continuous_certificate.hpp>
 #include <numbers>
 #include <support/numbers.hpp>
 #include <support/switching.hpp>

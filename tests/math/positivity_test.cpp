@@ -3,7 +3,7 @@
 
 #include <cmath>
 #include <complex>
-#include <esokit/gain/error_polynomial.hpp>
+#include <esokit/gain/certificate/error_polynomial.hpp>
 #include <esokit/math/positivity.hpp>
 #include <support/numbers.hpp>
 #include <vector>

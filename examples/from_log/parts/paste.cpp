@@ -10,7 +10,7 @@
 #include <esokit/adapter/guarded.hpp>
 #include <esokit/control/health.hpp>
 #include <esokit/core/version.hpp>
-#include <esokit/gain/gating_certificate.hpp>
+#include <esokit/gain/certificate/gating_certificate.hpp>
 #include <esokit/sim/gaussian.hpp>
 #include <esokit/sim/run.hpp>
 #include <esokit/tune/tuned_controller.hpp>

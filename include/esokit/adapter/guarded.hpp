@@ -79,10 +79,10 @@ requires(detail::goes_into_a_loop<Observer>()) struct GuardedConfig {
 ///   effect like up to one more order per lag. A sine that is captured too fast for its frequency
 ///   is refused (20 rad/s at omega_o = 100: `capture_bandwidth` 20 fails, 4 passes).
 /// - At each hold the error of dhat is at most that at the hold before, whatever phi was between
-///   them: `make` checks this, too (gain/gating_certificate.hpp). Poles in one place pass as they
-///   are up to omega_o T = 1 at least. For other gains, with slow sines for example, the first
-///   correction that is scaled within the settling time after a release stops all corrections of
-///   dhat for this time.
+///   them: `make` checks this, too (gain/certificate/gating_certificate.hpp). Poles in one place
+///   pass as they are up to omega_o T = 1 at least. For other gains, with slow sines for example,
+///   the first correction that is scaled within the settling time after a release stops all
+///   corrections of dhat for this time.
 ///
 /// Gaps and the effect of a level of a cascade on the next are not part of the proof. Searched,
 /// without a sequence that grows: all of the above with gaps of any length, for n = 1 .. 5, models

@@ -34,9 +34,9 @@ requires(detail::goes_into_a_loop<Observer>()) struct VariableTimeConfig {
 /// The gains for two lengths in turn can make the error grow although each alone is stable (order
 /// 3, omega_o 460 rad/s: 3 and 16 ms). So a correction bridges steps and gaps only up to the length
 /// for which errors decay in any sequence. For the chain with equal poles it is 14 / omega_o for
-/// three states, 5 / omega_o for four, 3 / omega_o for five (gain/detail/bridged_steps.hpp). After
-/// a longer one the observer restarts from the measurement: what `longest_gap()` bridges is for
-/// steps of one length.
+/// three states, 5 / omega_o for four, 3 / omega_o for five
+/// (gain/certificate/detail/bridged_steps.hpp). After a longer one the observer restarts from the
+/// measurement: what `longest_gap()` bridges is for steps of one length.
 ///
 /// AlgebraicEso counts samples: while its bandwidth falls, it treats all samples so far as if they
 /// had the present length; once settled it is exact. The gain sets of a switched observer follow

@@ -23,7 +23,7 @@
 #include <esokit/core/check.hpp>
 #include <esokit/core/detail/type_tag.hpp>
 #include <esokit/core/lanes.hpp>
-#include <esokit/gain/detail/bridged_steps.hpp>
+#include <esokit/gain/certificate/detail/bridged_steps.hpp>
 #include <esokit/gain/gain_law.hpp>
 #include <esokit/gain/sampled_gain.hpp>
 #include <limits>

@@ -6,7 +6,7 @@
 #include <esokit/core/check.hpp>
 #include <esokit/core/detail/declared_traits.hpp>
 #include <esokit/core/scalar.hpp>
-#include <esokit/gain/detail/bridged_steps.hpp>
+#include <esokit/gain/certificate/detail/bridged_steps.hpp>
 #include <esokit/gain/sampled_gain.hpp>
 #include <utility>
 

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <cstdint>
 #include <esokit/core/detail/type_tag.hpp>
+#include <esokit/gain/certificate/detail/gap_certificate.hpp>
 #include <esokit/gain/constant_gain.hpp>
-#include <esokit/gain/detail/gap_certificate.hpp>
 #include <esokit/gain/detail/model_placement.hpp>
 #include <esokit/gain/gain_law.hpp>
 #include <esokit/gain/placement.hpp>
@@ -293,9 +293,9 @@ struct PartDesign {
 ///     k_M = (Phi^M - A^M) P Phi^M' C' / (C P_M C'),  P_M = Phi^M P Phi^M'
 ///
 /// so that an observer with lost samples answers as it was designed. P is that of V(e) = e' P^-1 e,
-/// which falls in each sample without a gap (gain/detail/gap_certificate.hpp). Where V would rise
-/// in the step over M samples, the gain is nearer to that of a Kalman filter whose covariance
-/// before the gap was P, or equal to it:
+/// which falls in each sample without a gap (gain/certificate/detail/gap_certificate.hpp). Where V
+/// would rise in the step over M samples, the gain is nearer to that of a Kalman filter whose
+/// covariance before the gap was P, or equal to it:
 ///
 ///     k_M = P_M C' / (C P_M C' + R)
 ///

@@ -3,7 +3,7 @@
 /// given function is outside the stable range.
 #pragma once
 
-#include <esokit/gain/gain_interval.hpp>
+#include <esokit/gain/certificate/gain_interval.hpp>
 #include <esokit/gain/nonlinear_gain.hpp>
 #include <optional>
 

@@ -4,15 +4,15 @@
 ///
 /// A placement is a template argument of a linear observer. It defines what the config specifies
 /// (`Spec`), the check of it, the gains in both time domains, and what is known of steps over
-/// several samples. That is `recovery`, see gain/detail/bridged_steps.hpp; without it every gap
-/// restarts the observer.
+/// several samples. That is `recovery`, see gain/certificate/detail/bridged_steps.hpp; without it
+/// every gap restarts the observer.
 #pragma once
 
 #include <esokit/core/check.hpp>
 #include <esokit/core/detail/type_tag.hpp>
 #include <esokit/core/matrix.hpp>
+#include <esokit/gain/certificate/detail/bridged_steps.hpp>
 #include <esokit/gain/continuous_gain.hpp>
-#include <esokit/gain/detail/bridged_steps.hpp>
 #include <esokit/gain/sampled_gain.hpp>
 
 namespace esokit {

@@ -8,8 +8,8 @@
 #include <esokit/core/check.hpp>
 #include <esokit/core/detail/type_tag.hpp>
 #include <esokit/core/matrix.hpp>
+#include <esokit/gain/certificate/detail/gap_certificate.hpp>
 #include <esokit/gain/continuous_gain.hpp>
-#include <esokit/gain/detail/gap_certificate.hpp>
 #include <esokit/gain/detail/model_placement.hpp>
 #include <esokit/gain/feedback_gain.hpp>
 #include <esokit/gain/half_gain.hpp>
@@ -168,7 +168,8 @@ struct PoleSet {
     return SampledPoleSet<Size, S>::from_continuous(poles, sample_time);
   }
 
-  /// After which steps over several samples errors decay; see gain/detail/gap_certificate.hpp.
+  /// After which steps over several samples errors decay; see
+  /// gain/certificate/detail/gap_certificate.hpp.
   template <int Size, PlainScalar S>
   static detail::GapRecovery<S> recovery(const SampledPoleSet<Size, S>& poles) noexcept {
     using Fine = std::conditional_t<std::is_same_v<S, float>, double, S>;

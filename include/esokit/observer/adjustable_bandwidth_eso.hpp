@@ -7,8 +7,8 @@
 
 #include <esokit/core/check.hpp>
 #include <esokit/core/detail/type_tag.hpp>
+#include <esokit/gain/certificate/switching_certificate.hpp>
 #include <esokit/gain/switched_gain.hpp>
-#include <esokit/gain/switching_certificate.hpp>
 #include <esokit/observer/named_observer.hpp>
 #include <esokit/observer/predictor_corrector.hpp>
 

@@ -18,8 +18,8 @@ namespace esokit {
 /// A varying gain k(e) can make the error grow although every constant k in its range is stable.
 /// For N = 3 it does with k = 0.15 for 3.5 / omega_o, then k = 5 for 0.2 / omega_o, and so on. So k
 /// is limited to gain_min .. gain_max, a range within which the error decays however k varies
-/// (certified by a common quadratic Lyapunov function, see gain/switching_certificate.hpp). By
-/// default
+/// (certified by a common quadratic Lyapunov function, see
+/// gain/certificate/switching_certificate.hpp). By default
 /// - gain_min is 1/2: for T -> 0 and any N every gain_max is certified with it. If omega_o T is
 ///   large, it is three quarters of the way from 1 down to the smallest certified value;
 /// - gain_max is halfway from 1 to the largest certified value; at that value the error could ring

@@ -8,12 +8,12 @@
 #include <esokit/core/expected.hpp>
 #include <esokit/core/interval.hpp>
 #include <esokit/core/matrix.hpp>
+#include <esokit/gain/certificate/continuous_certificate.hpp>
 #include <esokit/gain/half_gain.hpp>
 #include <esokit/gain/nonlinear_gain_design.hpp>
 #include <esokit/model/scaled_chain.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>
-#include <esokit/sim/continuous_certificate.hpp>
 #include <esokit/sim/continuous_gain_law.hpp>
 #include <limits>
 #include <optional>

@@ -6,7 +6,7 @@
 #include <esokit/adapter/adapter.hpp>
 #include <esokit/core/detail/kernels.hpp>
 #include <esokit/core/expected.hpp>
-#include <esokit/gain/gating_certificate.hpp>
+#include <esokit/gain/certificate/gating_certificate.hpp>
 #include <esokit/model/detail/observable_part.hpp>
 #include <esokit/model/disturbance_constant.hpp>
 #include <limits>

@@ -11,7 +11,7 @@
 
 #include <cmath>
 #include <esokit/core/scalar.hpp>
-#include <esokit/gain/detail/bridged_steps.hpp>
+#include <esokit/gain/certificate/detail/bridged_steps.hpp>
 #include <esokit/gain/sampled_gain.hpp>
 #include <esokit/math/combinatorics.hpp>
 #include <esokit/math/detail/dense.hpp>

@@ -21,8 +21,8 @@
 #pragma once
 
 #include <cmath>
+#include <esokit/gain/certificate/switching_certificate.hpp>
 #include <esokit/gain/detail/model_placement.hpp>
-#include <esokit/gain/switching_certificate.hpp>
 #include <esokit/math/detail/dense.hpp>
 #include <esokit/model/chain_model.hpp>
 #include <esokit/model/detail/observable_part.hpp>

@@ -40,7 +40,7 @@ constexpr Array<Array<T, Size + 1>, Size> eulerian_table() noexcept {
 
 /// The error of a sampled observer, by the bilinear map z = (1 + s h/2) / (1 - s h/2) with h =
 /// `unit`: a positive multiple of the characteristic polynomial in z. That of a continuous observer
-/// is in sim/continuous_certificate.hpp.
+/// is in gain/certificate/continuous_certificate.hpp.
 ///
 /// q(s) = s^N + sum_r k_r h^-(r+1) G_r(h s/2) s^(N-1-r). The map takes the unit circle to the
 /// imaginary axis, and keeps common Lyapunov matrices and differences of rank one.

@@ -1,11 +1,11 @@
 /// @file
-/// What the stability certificates (gain/switching_certificate.hpp, gain/gain_interval.hpp) need of
-/// a continuous observer.
+/// What the stability certificates (gain/certificate/switching_certificate.hpp,
+/// gain/certificate/gain_interval.hpp) need of a continuous observer.
 #pragma once
 
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/scalar.hpp>
-#include <esokit/gain/gain_interval.hpp>
+#include <esokit/gain/certificate/gain_interval.hpp>
 
 namespace esokit {
 

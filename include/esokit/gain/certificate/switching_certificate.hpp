@@ -14,7 +14,7 @@
 #include <cmath>
 #include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
-#include <esokit/gain/error_polynomial.hpp>
+#include <esokit/gain/certificate/error_polynomial.hpp>
 #include <esokit/gain/placement.hpp>
 #include <esokit/math/positivity.hpp>
 #include <limits>

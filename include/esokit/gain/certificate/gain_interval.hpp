@@ -9,7 +9,7 @@
 
 #include <cmath>
 #include <esokit/core/interval.hpp>
-#include <esokit/gain/switching_certificate.hpp>
+#include <esokit/gain/certificate/switching_certificate.hpp>
 #include <limits>
 #include <numbers>
 
