@@ -71,23 +71,25 @@ class Panel:
     def get(self, key, default=""):
         return self.settings.get(key, [default])[0]
 
-    def finish(self, width):
+    def finish(self, width, spare):
         """For axes of about that width: where the legend is, what colours a map ends with, and the
-        room that numbers and labels need at the left, below, at the right and above, px."""
+        room that numbers and labels need at the left (and spare px more for long numbers beside a
+        label), below, at the right and above, px."""
         names = [one.name for one in self.drawn if one.name]
         self.legend = PLACES[int(self.get("legend", "2"))] if names else None
         # As many columns as gnuplot finds room for: all are as wide as the longest name.
         columns = max(1, int(width / (50 + 7.2 * max(map(len, names), default=0))))
         self.legend_height = 20 * math.ceil(len(names) / columns) if self.legend == "above" else 0
         self.limit = next((one.at for one in self.drawn if one.kind == "map"), None)
-        self.room = (74 if self.get("y_label") else 50,
+        self.room = (74 + spare if self.get("y_label") else 50,
                      8 if self.get("x_hidden") else 48 if self.get("x_label") else 28,
                      76 if self.limit else 18,
                      10 + (20 if self.get("title") else 0) + self.legend_height)
 
 
 class Figure:
-    def __init__(self, rows):
+    def __init__(self, rows, spare):
+        rows, self.spare = iter(rows), spare
         _, self.folder, self.name, self.title, lines, columns, height, self.formats = next(rows)
         self.panels, self.series = [], []
         blocks = iter(range(1, 10000))  # block 0 is the CSV's heading
@@ -112,7 +114,7 @@ class Figure:
         """Axes of one row share their top and bottom, axes of one column their left and right."""
         for panel in self.panels:
             span = panel.right_column - panel.left_column + 1
-            panel.finish(span * WIDTH / columns - 92)
+            panel.finish(span * WIDTH / columns - 92, self.spare)
 
         def widest(count, cell, side):
             return [max([panel.room[side] for panel in self.panels
@@ -284,21 +286,30 @@ class Figure:
         self.plot(panel, False)
 
 
-def main():
-    figure = Figure(csv.reader(sys.stdin))
+def draw(rows, spare):
+    """Draws the figure; returns whether each label beside an axis is in it."""
+    figure = Figure(rows, spare)
     file = Path(figure.folder) / figure.name
     Path(f"{file}.gp").write_text(figure.text, encoding="utf-8")
     for kind in figure.formats.split():
         Path(f"{file}.{kind}").unlink(missing_ok=True)
+    # -d: without the user's own start-up file, which could change every figure.
+    subprocess.run(["gnuplot", "-d", figure.name + ".gp"], cwd=figure.folder, check=True)
+    # An SVG holds text, not shapes: fonts of about the same width for readers without DejaVu.
+    svg = Path(f"{file}.svg").read_text(encoding="utf-8").replace(
+        'font-family="DejaVu Sans"', 'font-family="DejaVu Sans, Verdana, Arial, sans-serif"')
+    Path(f"{file}.svg").write_text(svg, encoding="utf-8")
+    # Where numbers take its room, gnuplot leaves a label out and says nothing.
+    return svg.count("rotate(270)") >= sum(bool(panel.get("y_label")) for panel in figure.panels)
+
+
+def main():
+    rows = list(csv.reader(sys.stdin))
     try:
-        # -d: without the user's own start-up file, which could change every figure.
-        subprocess.run(["gnuplot", "-d", figure.name + ".gp"], cwd=figure.folder, check=True)
-        # An SVG holds text, not shapes: fonts of about the same width for readers without DejaVu.
-        svg = Path(f"{file}.svg").read_text(encoding="utf-8").replace(
-            'font-family="DejaVu Sans"', 'font-family="DejaVu Sans, Verdana, Arial, sans-serif"')
-        Path(f"{file}.svg").write_text(svg, encoding="utf-8")
+        if not any(draw(rows, spare) for spare in range(0, 61, 12)):
+            sys.exit(f"figure {rows[0][2]}: no room for the label of an axis; use shorter numbers")
     except (OSError, subprocess.CalledProcessError) as error:
-        sys.exit(f"figure {figure.name}: gnuplot (Debian package gnuplot-nox): {error}")
+        sys.exit(f"figure {rows[0][2]}: gnuplot (Debian package gnuplot-nox): {error}")
 
 
 if __name__ == "__main__":
