@@ -13,8 +13,8 @@
 
 namespace esokit::examples {
 
-/// A stamp that is no plain number: 2024-03-01T12:00:00.010Z, 01.03.2024 12:00:00,01, 12:00:00.5,
-/// 1:02:03 PM, 0 days 00:00:01.5.
+/// A stamp that is no plain number: 2024-03-01T12:00:00.010Z, 01.03.2024 12:00:00,01,
+/// 01-Mar-2024 12:00:00.01, 12:00:00.5, 1:02:03 PM, 0 days 00:00:01.5.
 struct Stamp {
   long double seconds = 0;     ///< of its day, or since its start
   std::optional<long> day;     ///< days since 1970, or of a duration; none: a time of day
@@ -51,6 +51,14 @@ struct Rest {
     if (n == 0) return std::nullopt;
     return value;
   }
+  /// Three letters of an English month, as MATLAB writes it.
+  std::optional<long> month() {
+    constexpr std::string_view all = "JanFebMarAprMayJunJulAugSepOctNovDec";
+    const auto at = text.size() < 3 ? all.npos : all.find(text.substr(0, 3));
+    if (at == all.npos || at % 3 != 0) return std::nullopt;
+    text.remove_prefix(3);
+    return static_cast<long>(at / 3 + 1);
+  }
 };
 
 /// Days since 1970 of a date, by the proleptic Gregorian calendar.
@@ -66,7 +74,7 @@ inline std::optional<long> day_number(long year, long month, long day) {
   return days + (leap && month > 2 ? 1 : 0);
 }
 
-/// 2024-03-01, 2024/03/01, 01.03.2024; 03/04/2024 may be either.
+/// 2024-03-01, 2024/03/01, 01.03.2024, 01-Mar-2024; 03/04/2024 may be either.
 inline bool take_date(Rest& rest, Stamp& stamp) {
   const std::string_view from = rest.text;
   std::size_t count = 0;
@@ -75,7 +83,9 @@ inline bool take_date(Rest& rest, Stamp& stamp) {
   const char between = rest.text.front();
   if (between != '-' && between != '/' && between != '.') return false;
   rest.take(between);
-  const auto second = rest.digits(2);
+  auto second = rest.digits(2);
+  const bool named = !second;
+  if (named) second = rest.month();
   if (!second || !rest.take(between)) return false;
   if (count == 4) {
     const auto third = rest.digits(2);
@@ -85,7 +95,7 @@ inline bool take_date(Rest& rest, Stamp& stamp) {
     const auto year = rest.digits(4, &count);
     if (!year || count != 4) return false;
     const auto day_first = day_number(*year, *second, *first);
-    const auto month_first = day_number(*year, *first, *second);
+    const auto month_first = named ? std::nullopt : day_number(*year, *first, *second);
     stamp.either = between != '.' && day_first && month_first && *first != *second;
     stamp.day = day_first || between == '.' ? day_first : month_first;
   }
@@ -138,6 +148,7 @@ inline bool take_zone(Rest& rest, Stamp& stamp) {
   if (rest.text.empty()) return true;
   if (rest.take('Z') || rest.take('z') || rest.take("UTC") || rest.take("GMT")) {
     stamp.zone = true;
+    rest.take("[UTC]");
     return rest.text.empty();
   }
   const bool ahead = rest.take('+');

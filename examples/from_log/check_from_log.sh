@@ -466,6 +466,9 @@ named 'begins anew after 65536,' wrapped_ms.csv
 sed 's/^[^,]*,/0.25,/; 1s/.*/t,y,u/' plain.csv | awk -F, -v OFS=, 'NR > 1 { $1 = int((NR - 2) / 5) / 100 } 1' >rounded.csv
 sounds repeated rounded.csv
 truth=50 healthy rounded.csv --sample-time 0.002
+# Gaps every few rows.
+written t,y,u , t | awk 'NR == 1 || NR % 20 < 12' >bursts.csv
+named 'The rows come in bursts: ' bursts.csv
 # Only what changed: fields that are empty, rows that are missing. A coarse y stands still often.
 servo quantum=0.002 >rows.txt
 written t,y,u , t 'y = $2; if (NR > 1 && y == last) $2 = ""; last = y;' >changes.csv
@@ -558,6 +561,10 @@ servo rows=150 >rows.txt
 written t,y,u , t >short.csv
 shows rows short.csv
 servo >rows.txt
+written t,y,u , t | awk 'NR == 1 || NR % 80 < 20' >far_apart.csv
+shows rows far_apart.csv
+[[ $said == *"refused: The log has "*" gaps of about "* && $said != *"too short. Record"* ]]
+verdict $? "far_apart.csv does not say that it has gaps: $said"
 written t,y,u , t 'if (1) $3 = 1;' >constant.csv
 shows "u = 1: never changes" constant.csv
 [[ $said == *"refused: u is the same in all rows. Is it the right column (--u)?"* ]]
@@ -667,6 +674,10 @@ reads serial_monitor.txt --time 1 --y 2 --u 3
 { echo time,y,u; stamped 'sprintf("03/04/2024 %d:%s %sM", d ? 12 : 11, substr(clock(), 4), d ? "P" : "A")'
 } >american.csv
 reads american.csv
+{ echo date,y,u; stamped 'sprintf("%02d-%s-2024 ", d ? 1 : 29, d ? "Mar" : "Feb") clock()'; } >matlab.csv
+reads matlab.csv
+{ echo date,y,u; stamped 'sprintf("2024-02-%d", 28 + d) "T" clock() "Z[UTC]"'; } >java.csv
+reads java.csv
 { printf 'Messung vom 29.2.2024;;\nZeitstempel;Winkel;Stellgr\xf6\xdfe\n;rad;Nm\n'
   stamped 'sprintf("%02d.%s.2024 ", d ? 1 : 29, d ? "03" : "02") clock()' 'stamp ";" $2 ";" $3' |
     awk -F';' -v OFS=';' '{ sub(/\./, ",", $2); sub(/\./, ",", $3) } 1'; } >german.csv
@@ -776,6 +787,9 @@ written t,y,u , 'sprintf("%.3f", 20240331015940 + t)' >digits.csv
 refuses "If it is a date, write it as 2024-03-01T12:00:00" digits.csv
 sed '9s/^[^,]*/0.02/' plain.csv >backwards.csv
 refuses "backwards.csv, line 9: time runs backwards in column t, from 0.06 to 0.02" backwards.csv
+awk -F, -v OFS=, 'NR == 1 { print "cycle", $1, "t_ns", $2, $3; next }
+  { print int(NR / 200), ($1 % 2) "", sprintf("17%011d00000", $1 * 1e6), $2, $3 }' plain.csv >cycles.csv
+refuses "or is the time in --time 't_ns'?" cycles.csv --time t
 sed '9s/^[^,]*/0.06/' plain.csv >still.csv
 sounds repeated still.csv
 sed '9s/^[^,]*//' plain.csv >timeless.csv

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <esokit/identify/detail/b0_evidence.hpp>
 #include <esokit/identify/input_checks.hpp>
+#include <esokit/identify/log.hpp>
 #include <esokit/identify/spectrum.hpp>
 #include <numbers>
 #include <optional>
@@ -218,6 +219,25 @@ void say_moves(const Input& input, Findings& all) {
   }
 }
 
+/// Gaps that come every few rows: how many, how long, and how far apart.
+std::string gaps_in_words(const esokit::Log& log) {
+  std::vector<double> time, steps, gaps;
+  for (std::size_t k = 0; k < log.y.size(); ++k) {
+    if (!std::isfinite(log.u[k]) || !std::isfinite(log.y[k])) continue;
+    time.push_back(log.time.empty() ? static_cast<double>(k) * log.sample_time : log.time[k]);
+  }
+  for (std::size_t k = 1; k < time.size(); ++k) steps.push_back(time[k] - time[k - 1]);
+  const double usual = esokit::detail::median(steps);
+  for (const double step : steps) {
+    if (!(step < esokit::detail::longest_bridge * usual)) gaps.push_back(step);
+  }
+  const double apart = static_cast<double>(time.size()) / static_cast<double>(gaps.size() + 1);
+  if (time.size() < 200 || gaps.empty() || apart > 2.0 * esokit::detail::shortest_piece) return "";
+  return std::to_string(gaps.size()) + (gaps.size() == 1 ? " gap" : " gaps") + " of about " +
+         duration_text(esokit::detail::median(gaps)) + ", one every " + number_text(apart, 2) +
+         " rows of " + duration_text(usual);
+}
+
 /// The name of the column that was refused.
 void say_column(const Input& input, Findings& all) {
   const int index = all.refusal->index;
@@ -301,11 +321,14 @@ void say_residual(const compiled::Residual& residual, Findings& all) {
     if (count++ == 0) first = static_cast<double>(k) * T;
   }
   if (count > 0 && held > 0.5 * square && static_cast<double>(count) < 0.02 * rows) {
-    all.shown.push_back(std::to_string(count) + (count == 1 ? " row has " : " rows have ") +
-                        number_text(100 * held / square, 2) +
-                        " % of the squares of the residual, the first at " + duration_text(first) +
-                        ": y there does not follow from u. A value that came late or was wrong, a "
-                        "stop, or a machine of higher order?");
+    // First, as it may be all that is wrong.
+    all.shown.insert(
+        all.shown.begin(),
+        std::to_string(count) + (count == 1 ? " row has " : " rows have ") +
+            number_text(std::round(100 * held / square)) +
+            " % of the squares of the residual, the first at " + duration_text(first) +
+            ": y there does not follow from u. A value that came late or was wrong, a stop, or a "
+            "machine of higher order? Empty the fields of wrong values.");
     return;
   }
   if (const auto line = compiled::line_of(residual)) {
@@ -378,10 +401,16 @@ Findings examine(const Settings& settings, Input& input) {
       std::fprintf(stderr, "identifying the model: %3.0f %%\n", 100 * share);
     };
   }
+  all.gaps = gaps_in_words(input.log);
   if (const auto prepared = compiled::prepare(input.log)) {
     all.rows = prepared->data;
     all.found.log = prepared->report;
     const double T = all.rows.sample_time;
+    if (prepared->report.burst > 0.0) {
+      input.notes.insert(input.notes.begin(), "The rows come in bursts: " + all.gaps +
+                                                  ". They were read every " + duration_text(T) +
+                                                  ", which bridges the gaps.");
+    }
     all.u = spectrum(all.rows.u, T);
     all.y = spectrum(all.rows.y, T);
   } else {

@@ -118,6 +118,7 @@ struct Findings {
   std::vector<double> residual_correlation;  ///< lags 1, 2, ..
   double correlation_band = 0;               ///< white ones stay within this, 95 %
   std::vector<std::string> shown;            ///< what u, y and the residual show, in sentences
+  std::string gaps;                          ///< gaps that come every few rows; empty: none
   std::vector<Alarm> alarms;
 };
 

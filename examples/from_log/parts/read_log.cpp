@@ -167,18 +167,19 @@ bool long_table(const std::string& name) {
 
 /// The only column whose name is usual for it, of those that are not `taken` by a name; of several
 /// the one that is called so and nothing else. `output` is y, unless another column is: then it is
-/// u.
+/// u. A date is the time where nothing else is.
 std::string guess(const LogFile& file, const char* option, const std::string& given,
                   const std::vector<std::string>& taken, std::vector<std::string>& notes) {
   if (!given.empty()) return given;
   std::string there = "there are " + file.there();
   for (const auto& names : file.headers()) {
-    std::vector<std::size_t> fits, whole, outputs;
+    std::vector<std::size_t> fits, whole, outputs, dates;
     bool other_y = false;
     for (std::size_t i = 0; i < names.size(); ++i) {
       const bool free = std::find(taken.begin(), taken.end(), names[i]) == taken.end();
       const std::string first = words(names[i]).front();
       if (free && (first == "output" || first == "out")) outputs.push_back(i);
+      if (free && (first == "date" || first == "datum" || first == "fecha")) dates.push_back(i);
       const Usual* line = is_target(names[i]) ? nullptr : usual(names[i]);
       if (line == nullptr) continue;
       other_y = other_y || line->column == 'y';
@@ -195,6 +196,7 @@ std::string guess(const LogFile& file, const char* option, const std::string& gi
                         "' was taken for u, the output of the controller, as another column is y.");
       }
     }
+    if (fits.empty() && option[0] == 't') fits = dates;
     if (fits.size() == 1) return names[fits[0]];
     if (fits.empty()) continue;
     there = "it may be ";
@@ -466,11 +468,20 @@ void mend_stamps(const Settings& settings, const LogFile& file, Input& input,
       throw LogError(file.where(i) + "time runs backwards" + in +
                      " in all rows: the newest row is the first. Sort the rows by time");
     }
+    std::string other;
+    for (const auto& names : file.headers()) {
+      for (const std::string& name : names) {
+        const Usual* line = usual(name);
+        if (other.empty() && name != input.time && line != nullptr && line->column == 't')
+          other = "; or is the time in --time '" + name + "'?";
+      }
+    }
     throw LogError(file.where(i) + "time runs backwards" + in + ", from " +
                    number_text(origin + stamps[i - 1], 15) + " to " +
                    number_text(origin + stamps[i], 15) + since +
                    ": the clock was set, or the file contains two recordings. Cut the file there, "
-                   "or, if rows come at equal steps, leave the time out: --sample-time SECONDS");
+                   "or, if rows come at equal steps, leave the time out: --sample-time SECONDS" +
+                   other);
   }
   if (input.merged) return;
   const ClockRepair mended = spread_stamps(stamps);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <esokit/core/error_text.hpp>
@@ -342,7 +343,13 @@ std::vector<CsvRow> log_table(const Input& input, const Findings& findings) {
 std::vector<std::string> why_refused(const Findings& findings) {
   if (!findings.refusal) return {};
   const std::string numbers = esokit::to_text(*findings.refusal);
-  const std::string words = in_words(findings.refusal->field, findings.found);
+  std::string words = in_words(findings.refusal->field, findings.found);
+  if (std::string_view(findings.refusal->field) == "rows" && !findings.gaps.empty()) {
+    words = "The log has " + findings.gaps +
+            ": too little is between them. Log without gaps, at a rate that the logger keeps up "
+            "with. If the rows are equally far apart and only their stamps are not, use "
+            "--sample-time instead of --time.";
+  }
   std::vector<std::string> lines{words.empty() ? numbers : words};
   lines.insert(lines.end(), findings.shown.begin(), findings.shown.end());
   if (!words.empty()) lines.push_back("In numbers: " + numbers + ".");

@@ -41,10 +41,14 @@ struct LogReport {
 
   /// Rows in which a column had no finite number and was put between its neighbours, a column each.
   std::vector<std::size_t> lost{};
-  std::size_t missing = 0;    ///< rows that are missing according to the time stamps
-  std::size_t pieces = 1;     ///< number of pieces between gaps too long to bridge
-  double sample_time = 0.0;   ///< T: the mean step without gaps, s
-  double jitter = 0.0;        ///< standard deviation of the steps without gaps, s
+  std::size_t missing = 0;   ///< rows that are missing according to the time stamps
+  std::size_t pieces = 1;    ///< number of pieces between gaps too long to bridge
+  double sample_time = 0.0;  ///< T: the mean step without gaps, s
+  double jitter = 0.0;       ///< standard deviation of the steps without gaps, s
+
+  /// The usual step of rows that come in bursts with long gaps between, s: T is longer then, so
+  /// that the gaps are bridged. 0: they do not.
+  double burst = 0.0;
   double duration = 0.0;      ///< s
   double quantisation = 0.0;  ///< step of y, 0 if none is visible
   double saturated = 0.0;     ///< share of rows with u at its largest or smallest value
@@ -57,6 +61,9 @@ struct PreparedLog {
 };
 
 namespace detail {
+
+inline constexpr double longest_bridge = 5.5;      ///< the longest step that is no gap, in T
+inline constexpr std::size_t shortest_piece = 50;  ///< rows between gaps; fewer are left out
 
 double median(std::vector<double> values);
 

@@ -221,6 +221,40 @@ inline Check<double> check_sizes(const ValidRows& rows) {
   return rules;
 }
 
+/// The row after the last one of the piece that begins at `from`.
+inline std::size_t piece_end(const std::vector<double>& time, std::size_t from, double T) {
+  std::size_t to = from + 1;
+  while (to < time.size() && time[to] - time[to - 1] < longest_bridge * T) ++to;
+  return to;
+}
+
+/// A sample time that bridges the gaps of rows that come in bursts, which no piece of `T` holds:
+/// the shortest with nine tenths of the rows in pieces. `T` itself if most rows are in pieces, or
+/// there is none up to 5 T: across longer gaps nothing is seen of a machine for which T was chosen.
+inline double bridging_time(const std::vector<double>& time, double T) {
+  const auto share_in_pieces = [&](double step) {
+    std::size_t rows = 0;
+    for (std::size_t from = 0, to = 0; from < time.size(); from = to) {
+      to = piece_end(time, from, step);
+      if (to - from >= shortest_piece) rows += to - from;
+    }
+    return number(rows) / number(time.size());
+  };
+  if (share_in_pieces(T) >= 0.5) return T;
+  std::vector<double> gaps;
+  for (std::size_t k = 1; k < time.size(); ++k) {
+    const double step = time[k] - time[k - 1];
+    if (!(step < longest_bridge * T)) gaps.push_back(step);
+  }
+  std::sort(gaps.begin(), gaps.end());
+  for (const double part : {0.5, 0.75, 0.9, 0.95, 0.98, 0.99}) {
+    // A quarter, so that a gap may be a third longer than this one.
+    const double step = 0.25 * gaps[static_cast<std::size_t>(part * number(gaps.size() - 1))];
+    if (share_in_pieces(step) >= 0.9) return step <= 5.0 * T ? step : T;
+  }
+  return T;
+}
+
 /// Sample time, jitter and duration from the steps of time, which must rise.
 inline Check<double> find_sample_time(const Log& log, const ValidRows& rows, LogReport& report) {
   std::vector<double> steps;
@@ -235,13 +269,14 @@ inline Check<double> find_sample_time(const Log& log, const ValidRows& rows, Log
   for (const double step : steps) {
     if (step < 1.6 * middle) sum += step, regular += 1.0;
   }
-  const double T = log.time.empty() ? log.sample_time : sum / regular;
-  if (!(T >= 1e-12 && T <= 1e12))
-    return Error<double>{"sample_time", T, "must be between 1e-12 s and 1e12 s"};
+  const double usual = log.time.empty() ? log.sample_time : sum / regular;
+  if (!(usual >= 1e-12 && usual <= 1e12))
+    return Error<double>{"sample_time", usual, "must be between 1e-12 s and 1e12 s"};
   for (const double step : steps) {
-    if (step < 1.6 * middle) square += (step - T) * (step - T);
+    if (step < 1.6 * middle) square += (step - usual) * (step - usual);
   }
-  report.sample_time = T;
+  report.sample_time = bridging_time(rows.time, usual);
+  report.burst = report.sample_time > usual ? usual : 0.0;
   report.jitter = log.time.empty() ? log.jitter : std::sqrt(square / regular);
   report.duration = rows.time.back();
   return {};
@@ -269,14 +304,12 @@ class Gridded {
   }
 
   void all_pieces() {
-    constexpr double longest_bridge = 5.5;  // rows
     const double T = data_.sample_time;
     const std::vector<double>& time = rows_.time;
     std::size_t from = 0;
     while (from < time.size()) {
-      std::size_t to = from + 1;
-      while (to < time.size() && time[to] - time[to - 1] < longest_bridge * T) ++to;
-      if (to - from >= 50) piece(from, to);
+      const std::size_t to = piece_end(time, from, T);
+      if (to - from >= shortest_piece) piece(from, to);
       if (to < time.size()) {
         const double rows_between = (std::round)((time[to] - time[to - 1]) / T) - 1.0;
         report_.missing += static_cast<std::size_t>((std::min)(rows_between, 1e15));
@@ -292,7 +325,8 @@ class Gridded {
   void piece(std::size_t from, std::size_t to) {
     data_.starts.push_back(data_.y.size());
     data_.start_times.push_back(rows_.time[from]);
-    bool uniform = report_.jitter < 0.02 * data_.sample_time && !rows_.holds_more();
+    bool uniform =
+        report_.jitter < 0.02 * data_.sample_time && !rows_.holds_more() && !(report_.burst > 0.0);
     for (std::size_t k = from + 1; k < to; ++k)
       uniform = uniform && rows_.time[k] - rows_.time[k - 1] < 1.6 * data_.sample_time;
     if (uniform) {
