@@ -85,6 +85,7 @@ Named hour(Controller controller, from_log::Runner::Profile profile, const Settl
                                 .sample_time = m.sample_time,
                                 .input_range = 0.5 * (m.u_max - m.u_min),
                                 .noise = watch.noise,
+                                .latency = watch.latency,
                                 .memory = watch.memory,
                                 .divider = watch.divider})
                      .value();

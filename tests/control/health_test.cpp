@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <control/loop_traits.hpp>
+#include <deque>
 #include <esokit/adapter/guarded.hpp>
 #include <esokit/analysis/health_text.hpp>
 #include <esokit/control/adrc.hpp>
@@ -13,6 +15,7 @@
 #include <esokit/control/telemetry.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/model_eso.hpp>
+#include <numbers>
 #include <sstream>
 #include <string>
 #include <support/numbers.hpp>
@@ -118,6 +121,45 @@ TEST(Health, RatioWithALagInTheModel) {
     }
     EXPECT_NEAR(monitor.health().gain_ratio, ratio, 0.03 * std::abs(ratio) + 0.02);
     EXPECT_GT(monitor.health().evidence, 6);
+  }
+}
+
+/// A dead time of 4 / omega_o that the observer does not have: at the beginning u seems to do
+/// nothing. Told of it, the monitor accuses nobody, and finds what its filters say of b / b0.
+TEST(Health, ADeadTimeIsNoGainThatIsTooLarge) {
+  constexpr int late = 40;
+  constexpr double w = 4 * std::numbers::pi;
+  for (const double ratio : {1.0, 0.6, 2.0, -1.0}) {
+    for (const double latency : {0.0, late * sample_time}) {
+      auto loop = loop_of(20);
+      auto monitor = HealthMonitor<3>::make({.observer_bandwidth = omega_o,
+                                             .sample_time = sample_time,
+                                             .input_range = 1,
+                                             .latency = latency,
+                                             .memory = 2})
+                         .value();
+      ChainPlant plant(2, sample_time, 20 * ratio, 0);
+      std::deque<double> line(late, 0.0);
+      bool accused = false;
+      for (int k = 0; k < 3000; ++k) {
+        const double u = 0.8 * std::sin(w * k * sample_time);
+        loop.track(plant.output(), 0, u);
+        monitor.look(loop);
+        accused = accused || diagnose(monitor.health()) == LoopFault::gain_too_large_or_disturbed;
+        line.push_back(u);
+        plant.step(line.front());
+        line.pop_front();
+      }
+      const std::complex<double> s(0, w);
+      const auto poles = [&](double at) { return std::pow(1.0 / (1.0 + s / at), 3); };
+      const auto phi = poles(omega_o / (1 + omega_o * latency / 3));
+      const auto psi = poles(omega_o) * (ratio * std::exp(-s * (late * sample_time)) - 1.0);
+      // Without the delays of the hold and the divider, 3 samples: 3 T w = 0.04.
+      EXPECT_NEAR(monitor.health().gain_ratio, 1 + (std::conj(phi) * psi).real() / std::norm(phi),
+                  0.04 * std::abs(ratio));
+      if (ratio > 0) EXPECT_EQ(accused, latency == 0.0 && ratio < 2) << ratio << ' ' << latency;
+      EXPECT_EQ(diagnose(monitor.health()), ratio < 0 ? LoopFault::wrong_sign : LoopFault::none);
+    }
   }
 }
 
@@ -910,6 +952,24 @@ TEST(Health, RefusesBadSettings) {
   EXPECT_EQ(refused([](auto& c) { c.noise = -1; }), "noise: must be finite and not negative");
   EXPECT_EQ(refused([](auto& c) { c.memory = 0.0799; }),
             "memory: must be at least 8 / omega_o, that is");
+  for (const double latency : {-1e-9, hidden_nan<double>()}) {
+    EXPECT_EQ(refused([&](auto& c) { c.latency = latency; }),
+              "latency: must be finite and not negative");
+  }
+  // By N = 3 of memory / 8 - 1 / omega_o.
+  EXPECT_EQ(refused([](auto& c) {
+              c.memory = 0.16;
+              c.latency = 0.03;
+            }),
+            "accepted");
+  for (const double latency : {0.0301, 1e308}) {
+    EXPECT_EQ(
+        refused([&](auto& c) {
+          c.memory = 0.16;
+          c.latency = latency;
+        }),
+        "latency: is too large: memory must be at least 8 / omega_o + 8 latency / N, that is");
+  }
   EXPECT_EQ(refused([](auto& c) { c.divider = 0; }), "divider: must be 1 .. 1000");
   EXPECT_EQ(refused([](auto& c) { c.divider = 10; }), "accepted");
   EXPECT_EQ(refused([](auto& c) { c.divider = 11; }),

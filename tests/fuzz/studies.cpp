@@ -507,6 +507,7 @@ Failure health_study(Episode& episode) {
                                 .sample_time = T,
                                 .input_range = study.number<S>("input_range", {0.1, 10, true}),
                                 .noise = study.number<S>("noise", {0, 1}),
+                                .latency = study.number<S>("latency", {0, 0.5}),
                                 .memory = study.number<S>("memory", {0.1, 10, true}),
                                 .divider = study.choice("divider", 12)}));
   const auto probing = study.answer(

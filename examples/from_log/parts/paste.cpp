@@ -174,7 +174,12 @@ Watch watch_of(const Tuning& tuning, const TunedDesign& design, const esokit::Fi
           : esokit::detail::law_mean(gains, model.order) / std::max(design.bandwidth_ratio, 1e-9);
   watch.bandwidth = printed(std::min(watch.bandwidth, 0.99 / T));
   watch.divider = std::clamp(static_cast<int>(0.5 / (watch.bandwidth * T)), 1, 1000);
-  watch.memory = printed(200.0 / watch.bandwidth);
+  watch.latency = printed(model.dead_time + (design.knows.lag ? 0.0 : model.lag) +
+                          (design.knows.sensor ? 0.0 : model.sensor));
+  // Long enough for the slower evidence behind a latency.
+  watch.memory = printed(
+      std::max(200.0 / watch.bandwidth,
+               80.0 * (1.0 / watch.bandwidth + watch.latency / (model.order + design.extension))));
   const double rms = std::max(quantile(innovations, 0.95) / 1.96, model.noise);
   const double by_noise =
       esokit::detail::with_number<2, 5>(model.order + design.extension, [&](auto size) {
@@ -869,12 +874,13 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
   body += comment("The noise is that which makes the innovations of the log.", "    ");
   body += "    const auto monitor = esokit::HealthMonitor<" +
           std::to_string(model.order + design.extension) + ">::make(\n";
-  body += wrapped("{.observer_bandwidth = " + source(watch.bandwidth) +
-                      ", .sample_time = " + source(T) +
-                      ", .input_range = " + source(printed(0.5 * (model.u_max - model.u_min))) +
-                      ", .noise = " + source(watch.noise) + ", .memory = " + source(watch.memory) +
-                      ", .divider = " + std::to_string(watch.divider) + "});",
-                  "        ", " ");
+  body += wrapped(
+      "{.observer_bandwidth = " + source(watch.bandwidth) + ", .sample_time = " + source(T) +
+          ", .input_range = " + source(printed(0.5 * (model.u_max - model.u_min))) +
+          ", .noise = " + source(watch.noise) + ", .latency = " + source(watch.latency) +
+          ", .memory = " + source(watch.memory) + ", .divider = " + std::to_string(watch.divider) +
+          "});",
+      "        ", " ");
   body +=
       "    const auto fails = [](const auto& made) {\n"
       "      if (!made) std::printf(\"%s: %s\\n\", made.error().field, made.error().rule);\n"

@@ -211,6 +211,7 @@ struct Watch {
   bool guarded = false;  ///< the design is proven with a bound
   double bandwidth = 0;  ///< of the observer, rad/s
   double noise = 0;      ///< that makes the innovations of the log, unit of y
+  double latency = 0;    ///< that the observer does not have, s
   double memory = 0;     ///< s
   int divider = 1;
 };

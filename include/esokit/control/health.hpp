@@ -24,6 +24,8 @@ struct HealthConfig {
                            ///< it if you narrow the limits of the loop
   S noise{};     ///< standard deviation of the noise of y, unit of y; 0: unknown, no check of the
                  ///< innovation
+  S latency{};   ///< s: how much later than in the model of the observer u acts on y^(n), by dead
+                 ///< time and lags that it does not have; see HealthMonitor
   S memory = 1;  ///< s: time constant with which old samples are forgotten
   int divider = 4;  ///< D: the regression uses every D-th sample, 1 .. 1000; D omega_o T <= 1
 };
@@ -202,6 +204,12 @@ requires(model_traits<Model>.tells_constant) inline constexpr int simulated_lag<
 /// itself at u = 0, an axis on a long way. `underway` is the share of that. Where y stands, or
 /// moves the other way, `saturated` is named.
 ///
+/// A dead time or lag that the observer does not have delays the effect of u: until then it seems
+/// cancelled, and from about 3 / omega_o on a start was named `gain_too_large_or_disturbed`. With
+/// `latency` the poles that filter phi have its delay, too: they are at omega_m = omega_o /
+/// (1 + omega_o latency / N), which stands for omega_o in all times above. So faults need slower
+/// moves to be named, and rho holds for moves that are slow against omega_m.
+///
 /// With a model (ModelEso) psi is d only, and with an actuator's lag phi is b0 v, from the
 /// simulated output of the actuator.
 /// @tparam Size number of poles that filter phi: N of the observer, minus the order of an
@@ -221,6 +229,7 @@ requires(detail::is_a_plain_scalar<S>()) class HealthMonitor {
         .positive("sample_time", config.sample_time)
         .positive("input_range", config.input_range)
         .not_negative("noise", config.noise)
+        .not_negative("latency", config.latency)
         .positive("memory", config.memory)
         .demand(1 <= config.divider && config.divider <= 1000, "divider",
                 static_cast<S>(config.divider), "must be 1 .. 1000");
@@ -232,7 +241,14 @@ requires(detail::is_a_plain_scalar<S>()) class HealthMonitor {
                  "is too large: omega_o T D must be at most", -1, S(1), true})
         .demand(detail::at_most(S(S(8) / config.observer_bandwidth), config.memory),
                 {"memory", config.memory, "must be at least 8 / omega_o, that is", -1,
-                 S(8) / config.observer_bandwidth, true});
+                 S(8) / config.observer_bandwidth, true})
+        .demand(detail::at_most(S(S(8) / config.observer_bandwidth +
+                                  S(8) * config.latency / static_cast<S>(Size)),
+                                config.memory),
+                {"latency", config.latency,
+                 "is too large: memory must be at least 8 / omega_o + 8 latency / N, that is", -1,
+                 S(8) / config.observer_bandwidth + S(8) * config.latency / static_cast<S>(Size),
+                 true});
     if (!rules) return rules.error();
     return HealthMonitor(config);
   }
@@ -342,7 +358,9 @@ requires(detail::is_a_plain_scalar<S>()) class HealthMonitor {
   explicit HealthMonitor(const Config& config) noexcept
       : range_(config.input_range), divider_(config.divider) {
     const S x = config.observer_bandwidth * config.sample_time;
-    const S step = x * static_cast<S>(divider_);
+    // Size poles whose delay is that of the observer and the latency.
+    const S late = S(1) + config.observer_bandwidth * config.latency / static_cast<S>(Size);
+    const S step = x * static_cast<S>(divider_) / late;
     pole_ = std::exp(-step);
     slow_ = -std::expm1(-step / S(3));
     const S samples = config.memory / config.sample_time;
