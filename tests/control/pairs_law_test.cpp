@@ -52,7 +52,8 @@ class AnyLoop {
   [[nodiscard]] virtual bool looked() const = 0;
 };
 
-template <class C>
+/// @tparam soft whether the law softens
+template <class C, bool soft>
 class Erased final : public AnyLoop {
   using Observer = std::remove_cvref_t<decltype(std::declval<const C&>().observer())>;
   using Config = typename C::Config;
@@ -67,6 +68,7 @@ class Erased final : public AnyLoop {
     } else {
       fill(config, factor);
     }
+    if constexpr (soft) config.soften = true;
     return config;
   }
   Erased()
@@ -246,10 +248,10 @@ void obeys_the_laws(const AnyLoop& fresh) {
   EXPECT_TRUE(loop->looked());
 }
 
-template <class Observer, class Controller = Adrc<Observer>>
+template <class Observer, class Controller = Adrc<Observer>, bool soft = false>
 void obeys() {
   SCOPED_TRACE(testing::internal::GetTypeName<Observer>());
-  const Erased<Controller> loop;
+  const Erased<Controller, soft> loop;
   obeys_the_laws(loop);
   // All that is linear has a linear form; what knows a function of the user has none.
   const bool linear =
@@ -356,6 +358,18 @@ TEST(Pairs, OfMappedInput) {
   obeys<Mapped<Told<Plain>>>();
   obeys<Mapped<Guarded<Plain>>>();
   obeys_around<Mapped<Plain>>();
+  obeys_at_rest<Mapped<Plain>>();
+}
+template <class Observer>
+void obeys_softly() {
+  obeys<Observer, Adrc<Observer>, true>();
+}
+TEST(Pairs, OfALawThatSoftens) {
+  obeys_softly<Delayed<Plain>>();
+  obeys_softly<VariableTime<Plain>>();
+  obeys_softly<WrappedOutput<Plain>>();
+  obeys_softly<Mapped<Plain>>();
+  obeys_softly<Mapped<Guarded<Plain>>>();
 }
 TEST(Pairs, OfGuarded) {
   around_all<Guarded>();
