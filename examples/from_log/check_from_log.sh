@@ -879,16 +879,99 @@ if [[ -s $objects/libesokit_from_log.a ]]; then
 fi
 
 # from_log_c, where it was built: its C compiles, and controller and profile pass their self-tests.
+# Behind the curve of an actuator it holds the machine, by the words of its comment.
+cat >in_c.c <<'END'
+#include <math.h>
+#include <stdio.h>
+#include "c/NAME.h"
+#include "c/NAME_profile.h"
+#if PROFILE_ORDER == 1
+#define R r[0], r[1]
+#elif PROFILE_ORDER == 2
+#define R r[0], r[1], r[2]
+#else
+#define R r[0], r[1], r[2], r[3]
+#endif
+int main(void) {
+  static NAME_profile_state profile;
+  NAME_state law;
+  double x = 0, v = 0, old1 = 0, old2 = 0, error = 0;
+  int k, i;
+  if (NAME_self_test(0.0f) != 0 || NAME_profile_self_test(0.0f) != 0) return 1;
+  NAME_init(&law);
+  for (k = 0; k < 4000; ++k) {
+    const float target = k < 2000 ? 1.0f : -0.5f;
+    float r[PROFILE_ORDER + 1], u;
+    (void)NAME_profile_update(&profile, target);
+    NAME_profile_motion(&profile, r);
+#ifdef FEED
+    {
+      const float feed = NAME_profile_feed(&profile);
+      float e = NAME_EFFECT(NAME_update(&law, (float)x, R)) + feed;
+      e = e > LARGEST_EFFECT ? LARGEST_EFFECT : e < -LARGEST_EFFECT ? -LARGEST_EFFECT : e;
+      u = NAME_INPUT(e);
+      (void)NAME_applied(&law, NAME_INPUT(e - feed));
+    }
+#else
+    u = NAME_update(&law, (float)x, R);
+#endif
+    for (i = 0; i < 4; ++i) {
+      if (ORDER == 1) {
+        x += TIME / 4 * (20 * (i < 2 ? old2 : old1) - 3 * x);
+      } else {
+        v += TIME / 4 * (50 * old2 - 2 * v + 5);
+        x += TIME / 4 * v;
+      }
+    }
+    old2 = old1;
+    old1 = ACTUATOR(u);
+    if (k % 2000 > 1500) error = fmax(error, fabs(x - target));
+  }
+  printf("error %g\n", error);
+  return error < 0.02 ? 0 : 3;
+}
+END
+in_c() {  # in_c NAME ACTUATOR "FLAGS" [OPTION...]: of NAME.csv
+  local name=$1 actuator=$2 flags upper=${1^^}
+  read -ra flags <<<"$3"
+  "$(dirname "$program")/from_log_c" "$name.csv" --out c "${@:4}" >said_c 2>&1 &&
+    sed "s/NAME/$name/g; s/PROFILE_ORDER/${upper}_&/; s/$name\_EFFECT/EFFECT/; s/$name\_INPUT/INPUT/g" in_c.c >"$name.c" &&
+    "${CC:-cc}" -std=c99 -Wall -Wextra -Wconversion -Werror "-D${upper}_SELF_TEST" \
+      "-D${upper}_PROFILE_SELF_TEST" "-DACTUATOR(u)=($actuator)" "${flags[@]}" "$name.c" "c/$name.c" \
+      "c/${name}_profile.c" -lm -o in_c 2>>said_c && ./in_c >>said_c &&
+    [[ -s c/$name.st && -s c/${name}_profile.st ]]
+  verdict $? "$name.csv as C: $(tail -n 5 said_c)"
+}
+# rotor [ACTION]: y' = 20 times the effect of u - 3 y, steps of u; ACTION gives the effect
+rotor() {
+  awk "function random() { seed = (seed * 69069 + 12345) % 4294967296; return (seed + 0.5) / 4294967296 }
+    BEGIN {
+      print \"t,y,u\"; seed = 7
+      for (k = 0; k < 1500; ++k) {
+        if (k % 40 == 0) u = 2 * random() - 1
+        printf \"%.2f,%.6g,%.6g\\n\", k / 100, y + 0.02 * (random() + random() + random() + random() - 2), u
+        for (i = 0; i < 4; ++i) y += 0.0025 * (20 * (i < 2 ? old2 : old1) - 3 * y)
+        effect = u; ${1:-}
+        old2 = old1; old1 = effect
+      }
+    }"
+}
 if [[ -x $(dirname "$program")/from_log_c ]]; then
   servo >rows.txt
   written t,y,u , t >turn.csv
-  "$(dirname "$program")/from_log_c" turn.csv --out c >said_c 2>&1 &&
-    printf '%s\n' '#include "c/turn.h"' '#include "c/turn_profile.h"' 'int main(void) {' \
-      '  return turn_self_test(0.0f) != 0 || turn_profile_self_test(0.0f) != 0;' '}' >in_c.c &&
-    "${CC:-cc}" -std=c99 -Wall -Wextra -Wconversion -Werror -DTURN_SELF_TEST \
-      -DTURN_PROFILE_SELF_TEST in_c.c c/turn.c c/turn_profile.c -lm -o in_c 2>>said_c && ./in_c &&
-    [[ -s c/turn.st && -s c/turn_profile.st ]]
-  verdict $? "turn.csv as C: $(tail -n 5 said_c)"
+  in_c turn u '-DORDER=2 -DTIME=0.002'
+  grep -q effect_of c/turn.h
+  (($? == 1))
+  verdict $? "turn.csv as C: a curve where there is none"
+  in_c dead 'u > 1 ? u - 1 : u < -1 ? u + 1 : 0' '-DORDER=2 -DTIME=0.002' --limits 6
+  rotor >spin.csv
+  in_c spin u '-DORDER=1 -DTIME=0.01 -DFEED -DLARGEST_EFFECT=1.0f -DEFFECT(u)=u -DINPUT(e)=e' --order 1 --limits 1
+  rotor 'effect = u * (u > 0 ? u : -u)' >squared.csv
+  in_c squared 'u * fabs(u)' \
+    '-DORDER=1 -DTIME=0.01 -DFEED -DLARGEST_EFFECT=0.99f -DEFFECT(u)=squared_effect_of(u) -DINPUT(e)=squared_input_for(e)' \
+    --order 1 --limits 1
+  grep -q 'u is squared_input_for(e) of the effect e' c/squared_profile.h
+  verdict $? "squared.csv as C: its comment does not say how"
 fi
 
 wait "$pasted"

@@ -48,28 +48,28 @@ bool fails(const Code& code) {
 
 void write_code(const from_log::Design& design, const std::string& page) {
   const from_log::Pasting& pasting = design.pasting();
-  if (pasting.actuator.curved()) {
-    std::fprintf(stderr,
-                 "no C: a controller behind the curve of an actuator is written in C++ only; "
-                 "--literal curve leaves the curve out\n");
-    return;
-  }
   esokit::TuneModel model = design.tuning().model;
   const auto stem = std::filesystem::path(page).replace_extension();
   const std::string name = identifier(stem.filename().string());
   std::string recipe = "The law gets its motion.";
   if (pasting.order == 1) {
     const auto number = esokit::detail::source;
-    recipe = "u is " + name + "_update(.., motion) plus the feed, within " + number(model.u_min) +
-             " .. " + number(model.u_max) + "; then " + name +
-             "_applied gets u without the feed. While its mode is safe (2), nothing is added.";
+    const std::string within = " plus the feed, within " + number(model.u_min) + " .. " +
+                               number(model.u_max) + "; then " + name + "_applied gets ";
+    const std::string to_u = name + "_input_for", of_law = name + "_update(.., motion)";
+    recipe = pasting.actuator.curved()
+                 ? "u is " + to_u + "(e) of the effect e: " + name + "_effect_of(" + of_law + ")" +
+                       within + to_u +
+                       "(e without the feed), and the profile starts under the effect of u"
+                 : "u is " + of_law + within + "u without the feed";
+    recipe += ". While its mode is safe (2), nothing is added.";
     // As pasted: the law may ask for what is added to it, too.
     model.u_min -= pasting.pole_reach;
     model.u_max += pasting.pole_reach;
   }
   const auto code = esokit::detail::with_number<1, 3>(model.order, [&](auto order) {
     return esokit::tuned_code<order(), float>(
-        model, design.taken(),
+        model, design.taken(), pasting.actuator.seen.curve(),
         {.name = name, .comment = design.taken().name, .moving_reference = true});
   });
   if (fails(code)) return;

@@ -26,6 +26,9 @@ TEST(ActuatorMap, WithoutAPointTheEffectIsU) {
     EXPECT_EQ(map.effect(x), x);
     EXPECT_EQ(map.input(x), x);
   }
+  EXPECT_TRUE(map.is_straight());
+  EXPECT_FALSE(map_of<>({.slope_above = 2}).is_straight());
+  EXPECT_FALSE(map_of<>(ActuatorCurve<>::dead_zone(3)).is_straight());
 }
 
 TEST(ActuatorMap, DeadZone) {

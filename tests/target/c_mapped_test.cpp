@@ -74,6 +74,33 @@ TEST(CMapped, AtThePointsOfACurve) {
   }
 }
 
+/// For what is added to the effect before the curve. Nothing is written of a curve that is none.
+TEST(CMapped, ItsCurveCanBeCalled) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  const auto written = [](const ActuatorCurve<double>& curve) {
+    auto settings = config<Adrc<Mapped>>(8);
+    settings.observer.curve = curve;
+    return to_c(Adrc<Mapped>::make(settings).value(), {.name = "loop"}).value();
+  };
+  const auto curve = ActuatorCurve<double>::dead_zone(3, 0.75);
+  const auto map = ActuatorMap<double>::make(curve).value();
+  const Folder folder;
+  const Library library(folder, written(curve), "");
+  double (*effect_of)(double) = nullptr;
+  double (*input_for)(double) = nullptr;
+  library.find(effect_of, "loop_effect_of");
+  library.find(input_for, "loop_input_for");
+  Random random(1491);
+  for (int i = 0; i < 3000; ++i) {
+    const double x = random.uniform(-9, 9);
+    ASSERT_EQ(effect_of(x), map.effect(x)) << x;
+    ASSERT_EQ(input_for(x), map.input(x)) << x;
+  }
+  const Library without(folder, written({}), "");
+  EXPECT_TRUE(without.loaded());
+  EXPECT_FALSE(without.has("loop_effect_of"));
+}
+
 /// A law that softens is judged by the u that the actuator would have to put out, not by its
 /// effect.
 TEST(CMapped, OfALawThatSoftens) {

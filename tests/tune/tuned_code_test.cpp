@@ -47,6 +47,10 @@ TEST(TunedCode, IsThereForEachDesign) {
     EXPECT_EQ(behind.self_test(0.0f), 0);
     EXPECT_FLOAT_EQ(behind.update(1e6f, 0.0f), 5.0f);
     EXPECT_FLOAT_EQ(behind.update(-1e9f, 0.0f), -6.0f);
+    const auto straight =
+        tuned_code<1, float>(model, design, ActuatorCurve<double, 3>{}, {.name = "loop"});
+    EXPECT_EQ(straight.value().c.source, code->c.source);
+    EXPECT_EQ(straight.value().structured_text, code->structured_text);
     lags += design.knows.lag;
     cascades += design.levels > 1;
   }

@@ -169,6 +169,11 @@ class ActuatorMap {
     });
   }
 
+  /// Whether it has no point and a slope of 1, as a curve that was left out: the effect is u.
+  [[nodiscard]] constexpr bool is_straight() const noexcept {
+    return !(inputs_[0] < detail::unbounded<S>()) && lines_[0].slope == S(1.0);
+  }
+
   /// The slopes of real.effect(input(e)) over e, for effects from `lower` to `upper`. Of what a
   /// table does not say of the actuator.
   [[nodiscard]] constexpr GainLeft<S> gain_left(const ActuatorMap& real, const S& lower,

@@ -45,7 +45,8 @@ Expected<TunedCode, Error<double>> tuned_code(const TuneModel& model, const Tune
 
 /// The same for an actuator with a curve, around which the controller has a MappedInput.
 /// @param model of the plant behind the actuator: its b0 and limits are of the effect of u
-/// @param curve of the actuator; the limits of the code are those of u
+/// @param curve of the actuator; the limits of the code are those of u. Without a curve, `{}`, the
+/// code has none
 template <int Order, class S = double, int Points>
 Expected<TunedCode, Error<double>> tuned_code(const TuneModel& model, const TunedDesign& design,
                                               const ActuatorCurve<double, Points>& curve,

@@ -703,11 +703,13 @@ struct RecordAccess {
     return numbers;
   }
 
-  /// The curve of a MappedInput. Without a point, it gets one in the middle of its line.
+  /// The curve of a MappedInput. Without a point, it gets one in the middle of its line; nothing of
+  /// one that leaves u as it is.
   template <class O>
   static MapNumbers map(const O& o) {
     const auto& map = o.map();
     MapNumbers numbers;
+    if (map.is_straight()) return numbers;
     const auto add = [&](std::size_t line) {
       const auto& of = map.lines_[line];
       numbers.lines.push_back({static_cast<double>(of.offset), static_cast<double>(of.slope),

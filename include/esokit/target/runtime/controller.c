@@ -23,24 +23,24 @@ R"esokit("
 
 static unsigned update_mapped(esokit_state *o, real y, real u)
 {
-  return inner_update(o, y, effect_of(u));
+  return inner_update(o, y, esokit_effect_of(u));
 }
 
 static unsigned predict_mapped(esokit_state *o, real u)
 {
-  return inner_predict(o, effect_of(u));
+  return inner_predict(o, esokit_effect_of(u));
 }
 
 #if ESOKIT_CONTROLLER
 static bool rest_mapped(esokit_state *o, real y, real u)
 {
-  return inner_rest(o, y, effect_of(u));
+  return inner_rest(o, y, esokit_effect_of(u));
 }
 
 /* The u with an effect that may have none. */
 static real finite_input_for(real effect)
 {
-  const real u = input_for(effect);
+  const real u = esokit_input_for(effect);
   return is_finite(u) ? u : ((u < 0.0) ? -LARGEST : LARGEST);
 }
 
@@ -110,7 +110,7 @@ static real wanted(esokit_state *o, DESIGN_R)
   u = u * o->input_factor;
 #endif
 #if ESOKIT_MAPPED
-  u = input_for(u);
+  u = esokit_input_for(u);
 #endif
 #if ESOKIT_SOFTENS
   (void)soften(o, u);
@@ -208,9 +208,9 @@ unsigned esokit_start(esokit_state *o, real y, real u)
 #endif
   before = *o;
 #if ESOKIT_DELAYED && ESOKIT_MAPPED && ESOKIT_GUARDED
-  fill_delayed(o, effect_of(u) * o->gain_ratio);
+  fill_delayed(o, esokit_effect_of(u) * o->gain_ratio);
 #elif ESOKIT_DELAYED && ESOKIT_MAPPED
-  fill_delayed(o, effect_of(u));
+  fill_delayed(o, esokit_effect_of(u));
 #elif ESOKIT_DELAYED && ESOKIT_GUARDED
   fill_delayed(o, u * o->gain_ratio);
 #elif ESOKIT_DELAYED
@@ -346,7 +346,7 @@ static real hold_sample(esokit_state *o, real measured, real u)
 #endif
   o->elsewhere = 1u;
 #if ESOKIT_MAPPED
-  given = input_for(hold_guards(o));
+  given = esokit_input_for(hold_guards(o));
 #else
   given = hold_guards(o);
 #endif

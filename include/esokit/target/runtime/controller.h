@@ -208,6 +208,11 @@ unsigned esokit_correct(esokit_state *o, real y);
 #endif
 /* Estimate number 0 .. DESIGN_LAST: y, y', .., and then the disturbance, in physical units. */
 real esokit_estimate(const esokit_state *o, unsigned row);
+#if ESOKIT_MAPPED
+/* The curve of the actuator: the effect of u, and the u that has it. */
+real esokit_effect_of(real u);
+real esokit_input_for(real effect);
+#endif
 
 #if ESOKIT_MEASURED
 /* w, measured, before the sample at which it begins to act; without it, or if it is not finite,

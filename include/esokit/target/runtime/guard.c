@@ -289,7 +289,7 @@ static bool rest_guarded(esokit_state *o, real y, real u)
 real esokit_hold(esokit_state *o)
 {
 #if ESOKIT_MAPPED
-  return input_for(hold_guards(o));
+  return esokit_input_for(hold_guards(o));
 #else
   return hold_guards(o);
 #endif

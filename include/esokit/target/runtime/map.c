@@ -44,18 +44,16 @@ static real on_curve(real x, bool back)
   return y;
 }
 
-static real effect_of(real u)
+real esokit_effect_of(real u)
 {
   return on_curve(u, false);
 }
 
-#if ESOKIT_CONTROLLER || ESOKIT_GUARDED
-static real input_for(real effect)
+real esokit_input_for(real effect)
 {
   return on_curve(effect, true);
 }
 
-#endif
 #endif
 #ifdef __cplusplus
 ")esokit"
