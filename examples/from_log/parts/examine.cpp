@@ -275,6 +275,13 @@ std::string in_words(const esokit::SeenCurve& curve, const std::string& u) {
   }
 }
 
+/// A dead zone takes from u whatever y does; friction brakes the motion. A log that tells no
+/// friction has a dead zone.
+const std::string sticks_or_not =
+    " The log also tells friction, so it may be friction that sticks: y stands still under a small "
+    "u, too, but one that moves goes on under it. For both take a softness of a fourth, "
+    "ActuatorCurve<>::dead_zone(size, size / 4), and Resting around the controller.";
+
 /// The effect in place of u, where the log tells the curve of the actuator: b0 is one number then.
 /// Not if the log tells it, and is refused with the curve.
 void take_effect(esokit::IdentifyOptions options, Input& input, Findings& all) {
@@ -288,6 +295,8 @@ void take_effect(esokit::IdentifyOptions options, Input& input, Findings& all) {
   all.refusal.reset();
   if (!verdict) all.refusal = verdict.error();
   const double before = all.found.input_gain.value;
+  const bool may_stick =
+      curve.kind == esokit::CurveKind::dead_zone && all.found.friction.low() > 0.0;
   all.found = *found;
   all.curve = curve;
   all.rows = compiled::prepare(acted)->data;
@@ -300,7 +309,8 @@ void take_effect(esokit::IdentifyOptions options, Input& input, Findings& all) {
                          "b0 is " +
                          number_text(before, 3) +
                          " on the average). So below, u is the effect, in the unit of u, and the "
-                         "code puts out the u that has it. If not, use --literal curve.");
+                         "code puts out the u that has it. If not, use --literal curve." +
+                         (may_stick ? sticks_or_not : ""));
 }
 
 /// What is left when the model has explained what it can.
