@@ -23,14 +23,15 @@ constexpr double T = 0.01, pole = 3;
 
 struct Machine {
   std::function<double(double)> effect = [](double u) { return u; };
-  double gain = 20, size = 1, friction = 0;
+  double gain = 20, size = 1, friction = 0, sticks = 0;
   double noise = 0.02;
   std::uint64_t seed = 11;
   std::size_t rows = 1500;
   bool two_levels = false;
 };
 
-// y' = b0 effect(u(t - 1.5 T)) - a y - friction, steps of u between -size and size.
+// y' = b0 effect(u(t - 1.5 T)) - a y - friction, steps of u between -size and size. `sticks` holds
+// y at rest and brakes it.
 Log recorded(const Machine& machine) {
   esokit::sim::Gaussian gaussian(machine.seed);
   Log log;
@@ -43,7 +44,12 @@ Log recorded(const Machine& machine) {
     log.y.push_back(y + machine.noise * gaussian.next());
     for (int i = 0; i < 20; ++i) {
       const double force = machine.gain * machine.effect(i < 10 ? earlier : before);
-      y += T / 20 * (force - pole * y - machine.friction * std::tanh(y / 0.1));
+      const bool stands = !(std::abs(y) > 0);
+      if (stands && std::abs(force) <= machine.sticks) continue;
+      const double dry = machine.sticks * std::copysign(1.0, stands ? force : y);
+      const double next =
+          y + T / 20 * (force - pole * y - machine.friction * std::tanh(y / 0.1) - dry);
+      y = machine.sticks > 0 && y * next < 0 ? 0 : next;
     }
     earlier = before;
     before = u;
@@ -139,6 +145,22 @@ TEST(SeenCurve, IsNotToldWhereThereIsNone) {
     EXPECT_TRUE(found.by_size.differ()) << knee;
     EXPECT_FALSE(found.curve.seen()) << knee;
   }
+}
+
+// Friction that sticks may pass for a dead zone: then the log tells friction, too, as it does not
+// of a dead zone alone.
+TEST(SeenCurve, FrictionTellsWhatSticksFromADeadZone) {
+  int alike = 0;
+  for (std::uint64_t seed = 31; seed < 35; ++seed) {
+    const Identified dead =
+        studied(recorded({.effect = [](double u) { return dead_zone(u, 0.3); }, .seed = seed}));
+    EXPECT_EQ(dead.curve.kind, CurveKind::dead_zone) << seed;
+    EXPECT_LE(dead.friction.low(), 0) << seed;
+    const Identified sticks = studied(recorded({.sticks = 7, .seed = seed}));
+    EXPECT_GT(sticks.friction.low(), 0) << seed;
+    alike += sticks.curve.kind == CurveKind::dead_zone ? 1 : 0;
+  }
+  EXPECT_GT(alike, 0);
 }
 
 // Of a log that is refused, too: it says why.
