@@ -10,6 +10,7 @@
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
+#include <esokit/control/follow_profile.hpp>
 #include <esokit/control/predictive_adrc.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
@@ -536,6 +537,57 @@ TEST(StructuredText, OfApproaches) {
   approaches_in_text<1, 0, float>(2, 741);
   approaches_in_text<1, 3, double>(-0.5, 751);
   approaches_in_text<2, 4, float>(0.3, 761);
+}
+
+template <int Order, class V>
+void follows_in_text(double fastest, double filter_time, std::uint64_t seed) {
+  SCOPED_TRACE(Order);
+  FollowProfileConfig<Order, V> config{.filter_time = static_cast<V>(filter_time),
+                                       .sample_time = V(0.03125)};
+  config.limits[Order - 1] = V(4);
+  if (Order == 2 || fastest > 0) config.limits[0] = static_cast<V>(fastest);
+  auto profile = FollowProfile<Order, V>::make(config).value();
+  const auto block = to_structured_text(profile, {.name = "profile"}).value();
+  const bool second = Order == 2;
+  Samples samples(std::string("target target1 ") + (second ? "target2 y speed" : "y") +
+                  " starts waits : started good r r1" + (second ? " r2" : ""));
+  Random random(seed + asked("ESOKIT_WRITTEN_SEED", 0));
+  const auto number = [&](double most) { return static_cast<V>(random.uniform(-most, most)); };
+  typename FollowProfile<Order, V>::Motion target{};
+  int begun = 0, refused = 0, held = 0;
+  for (int k = 0; k < 4 * samples_each; ++k) {
+    if (random.index(40) == 0) {
+      for (int i = 0; i <= Order; ++i) target(i) = random.index(2) == 0 ? number(5) : V(0);
+    }
+    target(0) = random.index(200) == 0 ? number(20) : target(0) + V(0.03125) * target(1);
+    if (random.index(80) == 0) held = random.index(20);
+    const bool waits = held-- > 0, starts = random.index(100) == 0;
+    auto given = target;
+    for (int i = 0; i <= Order; ++i) given(i) = odd(random, target(i));
+    const V y = odd(random, number(20)), speed = second ? odd(random, number(5)) : V(0);
+    const bool started = starts && profile.start(y, speed);
+    bool good = true;
+    waits ? profile.wait() : void(good = profile.update(given));
+    for (int i = 0; i <= Order; ++i) samples.number(given(i));
+    samples.number(y);
+    if (second) samples.number(speed);
+    samples.count(starts).count(waits).count(started).count(good);
+    for (int i = 0; i <= Order; ++i) samples.number(profile.motion()(i));
+    samples.word("\n");
+    begun += started;
+    refused += !good;
+  }
+  EXPECT_GT(begun, 0);
+  EXPECT_GT(refused, 0);
+  interprets(block, samples);
+}
+
+TEST(StructuredText, OfFollowers) {
+  if (!there("python3")) GTEST_SKIP() << "no python3";
+  follows_in_text<1, float>(3, 0, 771);
+  follows_in_text<1, double>(3, 0.1, 781);
+  follows_in_text<2, double>(2, 0, 791);
+  follows_in_text<2, float>(0, 0.1, 801);
 }
 
 template <class V>

@@ -193,6 +193,10 @@ TEST(WrittenNames, NoVariableIsAWordOfStructuredText) {
                                          .value(),
                                      named("motor"))
                       .value());
+  texts.push_back(
+      to_structured_text(FollowProfile<2>::make({.limits = {1, 1}, .sample_time = 1e-2}).value(),
+                         named("motor"))
+          .value());
   texts.push_back(to_structured_text(
                       TimeProportioned<>::make({.on = 1, .window = 1, .sample_time = 1e-2}).value(),
                       named("motor"))

@@ -49,7 +49,8 @@ requires(detail::is_a_plain_scalar<S>()) struct FollowProfileConfig {
 ///     r'' = -A sat(h e' / d + y / m + sign(y) (m - 1) / 2)
 ///
 /// For Order 1, r goes to the target within a sample, or at the limit. A jerk limit (Order 3) is a
-/// matter for Ruckig, see the page of control practice. `to_c` does not write it.
+/// matter for Ruckig, see the page of control practice. `to_c` writes both orders,
+/// target/profile_code.hpp.
 ///
 /// While the axis cannot move, call `wait()` in place of `update`: r brakes and stands still. If
 /// others move it, `start(y)`.
@@ -141,6 +142,7 @@ requires(detail::is_a_plain_scalar<S>()) class FollowProfile {
   }
 
  private:
+  friend struct detail::RecordAccess;
   using Sum = detail::FineSum<S>;
 
   explicit FollowProfile(const Config& config) noexcept : config_(config) {}

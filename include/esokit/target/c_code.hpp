@@ -69,8 +69,8 @@ CCode c_code(const RecordedDesign& design);
 /// integers), and calls abs, sqrt, pow, exp, expm1, sin, cos, tan, atan and tanh as by `using
 /// std::sin;`. A branch on a value does not compile: `select(condition, a, b)` chooses.
 ///
-/// SmoothProfile and ApproachProfile, TimeProportioned, HealthMonitor: target/profile_code.hpp,
-/// target/time_proportioned_code.hpp and target/health_code.hpp.
+/// SmoothProfile, ApproachProfile and FollowProfile, TimeProportioned, HealthMonitor:
+/// target/profile_code.hpp, target/time_proportioned_code.hpp and target/health_code.hpp.
 /// @param object as `make` returned it, or running, after a valid sample: `init` begins in its
 ///        state, a `start` or report since included. A gap that runs, safe mode and a sample
 ///        without a measurement that is due are not kept

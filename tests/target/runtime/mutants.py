@@ -28,6 +28,7 @@ NEAR = {
     "controller.c": [("c_code", "*OfALinearObserverInFloat:*OfAnObserverAlone:*OfWhatIsSafe"),
                      ("c_kinds", "*OfDelaysAndOtherForms"), ("c_guarded", "*OfPinHoldAndGain"),
                      ("c_saved", "*")],
+    "follow.c": [("profile_code", "*Follower*")],
     "guard.c": [("c_guarded", "*Pin*:*Frozen*")],
     "health.c": [("health_code", "*Equals*:*Alike*")],
     "law.c": [("c_running", "*OfASchedule:*OfAFilter")],
@@ -35,6 +36,7 @@ NEAR = {
     "measured.c": [("c_guarded", "*OfAMeasured*:*OfSeveral*")],
     "predictive.c": [("c_predictive", "*EqualsTheController:*OfASchedule")],
     "profile.c": [("profile_code", "*Equals*")],
+    "sum.c": [("profile_code", "*Follower*")],
     "proportioned.c": [("time_proportioned_code", "*Equals*")],
 }
 OTHERS = [("c_code", "*OfALinearObserverInFloat:*OfAnObserverAlone"), ("c_running", "*OfLongGaps"),

@@ -693,6 +693,16 @@ struct RecordAccess {
     return numbers;
   }
 
+  /// The settings of a FollowProfile, and h.
+  template <class P>
+  static auto follow(const P& p) noexcept {
+    struct {
+      typename P::Config config;
+      typename P::scalar_type width;
+    } const numbers{p.config_, p.width()};
+    return numbers;
+  }
+
   /// The settings of a TimeProportioned.
   template <class P>
   static auto proportioned(const P& p) noexcept {
