@@ -567,7 +567,11 @@ void follows_in_text(double fastest, double filter_time, std::uint64_t seed) {
     const V y = odd(random, number(20)), speed = second ? odd(random, number(5)) : V(0);
     const bool started = starts && profile.start(y, speed);
     bool good = true;
-    waits ? profile.wait() : void(good = profile.update(given));
+    if (waits) {
+      profile.wait();
+    } else {
+      good = profile.update(given);
+    }
     for (int i = 0; i <= Order; ++i) samples.number(given(i));
     samples.number(y);
     if (second) samples.number(speed);
