@@ -69,9 +69,6 @@ static void go(esokit_state *o, real highest)
 {
 #if ESOKIT_SECOND
   const real speed = o->speed.whole + o->speed.rest;
-#if ESOKIT_LIMITED
-  real beyond;
-#endif
   o->motion[1] = speed;
 #endif
   o->motion[0] = o->place.whole + o->place.rest;
@@ -80,7 +77,7 @@ static void go(esokit_state *o, real highest)
   add(&o->place, SAMPLE_TIME * (speed + (HALF_A_SAMPLE * highest)));
   add(&o->speed, SAMPLE_TIME * highest);
 #if ESOKIT_LIMITED
-  beyond = fabs(o->speed.whole + o->speed.rest) - FASTEST;
+  const real beyond = fabs(o->speed.whole + o->speed.rest) - FASTEST;
   if ((beyond > 0.0) && (beyond < ROUNDING)) { /* what rounding adds to the limit */
     o->speed.whole = within(o->speed.whole + o->speed.rest, FASTEST);
     o->speed.rest = 0.0;
@@ -117,50 +114,42 @@ static real acceleration(const esokit_state *o)
   const real place = (beyond_target(o) - (HALF_A_SAMPLE * faster)) + (WIDTH * faster);
   const real of_target = o->thrust / HIGHEST;
   real share = 1.0 + of_target; /* what a target that accelerates leaves to brake with */
-  real unit;
-  real way;
-  real root;
-  real samples;
-  real curve;
-  real chosen;
   if (place > 0.0) {
     share = 1.0 - of_target;
   }
   if (!(share > 0.0625)) {
     share = 0.0625;
   }
-  unit = share * UNIT;
-  way = fabs(place) / unit;
+  const real unit = share * UNIT;
+  real way = fabs(place) / unit;
   if (!(way < LONGEST)) {
     way = LONGEST;
   }
-  root = (1.0 + sqrt(1.0 + (8.0 * way))) / 2.0;
-  samples = ceil(root);
+  const real root = (1.0 + sqrt(1.0 + (8.0 * way))) / 2.0;
+  real samples = ceil(root);
   if (samples > root) { /* down */
     samples = samples - 1.0;
   }
-  curve = (way / samples) + ((samples - 1.0) / 2.0);
+  real curve = (way / samples) + ((samples - 1.0) / 2.0);
   if (place < 0.0) {
     curve = -curve;
   }
-  chosen = within(o->thrust - (HIGHEST * (share * (((WIDTH * faster) / unit) + curve))), HIGHEST);
+  const real chosen = o->thrust - (HIGHEST * (share * (((WIDTH * faster) / unit) + curve)));
 #if ESOKIT_LIMITED
-  chosen = not_too_fast(chosen, speed);
+  return not_too_fast(within(chosen, HIGHEST), speed);
+#else
+  return within(chosen, HIGHEST);
 #endif
-  return chosen;
 }
 
 #endif
 bool esokit_start(esokit_state *o, real y, real speed)
 {
-  unsigned i;
   if (!fits(y, speed)) {
     return false;
   }
-  for (i = 0u; i < COUNT; ++i) {
-    o->motion[i] = 0.0;
-  }
   o->motion[0] = y;
+  o->motion[ORDER] = 0.0;
   o->place.whole = y;
   o->place.rest = 0.0;
 #if ESOKIT_SECOND
