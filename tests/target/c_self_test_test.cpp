@@ -77,7 +77,7 @@ TEST(CSelfTest, ReachesNearlyAllOfAProfile) {
   SmoothProfileConfig<2, float> settings{.sample_time = 0.004F};
   settings.limits = {3.0F, 20.0F};
   reaches(to_c(SmoothProfile<2, float>::make(settings).value(), {.name = "loop"}).value());
-  reaches(to_c(FollowProfile<2>::make({.limits = {0.05, 20}, .sample_time = 0.004}).value(),
+  reaches(to_c(FollowProfile<2>::make({.limits = {0.3, 20}, .sample_time = 0.004}).value(),
                {.name = "loop"})
               .value());
 }

@@ -274,32 +274,35 @@ Expected<std::string, Error<S>> to_structured_text(
 
 namespace detail {
 
-/// A sample of the self-test of a FollowProfile: what is done (0 a target, 1 one that is lost, 2
-/// waits, 3 starts), with which numbers, and the motion then.
-/// @param way of a sample, by the limits
+/// A sample of the self-test of a FollowProfile: what is done (0 a target, 2 a start, one more: of
+/// numbers that are infinite, 4 waits), with which numbers, and the motion then.
+/// @param fastest, highest derivatives of its targets
 template <int Order, class S>
 std::vector<S> follow_sample(FollowProfile<Order, S>& played, int k, S way, S fastest, S highest) {
-  constexpr S largest = (std::numeric_limits<S>::max)();
-  Vector<S, Order + 1> given = Vector<S, Order + 1>::Zero();
-  const bool forth = (k / 30) % 2 == 0;
-  const int call = k % 30 == 20 ? 1 : k % 30 > 20 && k % 30 < 24 ? 2 : k == 65 ? 3 : 0;
+  using Motion = typename FollowProfile<Order, S>::Motion;
+  const bool forth = (k / 30) % 2 == 0, turns = (k / 15) % 2 == 1;
+  const int at = k % 30;
+  const int call = at == 18 || at == 20 || at == 22 ? 1 : at > 24 && at < 28 ? 4 : 0;
+  const int starts = k == 63 ? 3 : k == 65 ? 2 : 0;
+  Motion given = Motion::Zero();
   given(0) = clipped(S(S(forth ? 16 : -8) * way));
-  if (k / 15 % 2 == 1) given(1) = clipped(S(S(forth ? -1 : 2) * fastest));
-  if constexpr (Order == 2) {
-    if (k / 10 % 2 == 1) given(2) = highest / S(4);
+  if (turns) given(1) = clipped(S(S(forth ? -1 : 2) * fastest));
+  if (Order == 2 && (k / 10) % 2 == 1) given(Order) = highest;
+  if (call == 1 || starts == 3) {
+    given = Motion::Zero();
+    given((k / 2) % (Order + 1)) = S(4);
   }
-  if (call == 1) {
-    given(0) = S(4) * largest;
-    (void)played.update(given);
-    given(0) = S(4);
-  } else if (call == 2) {
+  const S by = call == 1 || starts == 3 ? (std::numeric_limits<S>::max)() : S(1);
+  Motion scaled = given;
+  for (int i = 0; i <= Order; ++i) scaled(i) = given(i) * by;
+  if (starts > 0) {
+    (void)played.start(scaled(0), scaled(1));
+  } else if (call == 4) {
     played.wait();
-  } else if (call == 3) {
-    (void)played.start(given(0), given(1));
   } else {
-    (void)played.update(given);
+    (void)played.update(scaled);
   }
-  std::vector<S> sample{S(call)};
+  std::vector<S> sample{S(starts > 0 ? starts : call)};
   for (int i = 0; i <= Order; ++i) sample.push_back(given(i));
   for (int i = 0; i <= Order; ++i) sample.push_back(played.motion()(i));
   return sample;

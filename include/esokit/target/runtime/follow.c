@@ -197,8 +197,8 @@ void esokit_motion(const esokit_state *o, real motion[COUNT])
 #ifdef ESOKIT_SELF_TEST
 int esokit_self_test(real tolerance)
 {
-  /* 0: a target, 1: one that is lost, 2: waits, 3: starts; target or start, motion */
   static const real samples[SAMPLES][COLUMNS] = {
+    /* 0: target, 2: start, 1, 3: infinite ones, 4: waits; its numbers, motion */
     DESIGN_VECTORS
   };
   esokit_state o;
@@ -208,21 +208,23 @@ int esokit_self_test(real tolerance)
   for (i = 0u; i < SAMPLES; ++i) {
     const unsigned call = (unsigned)samples[i][0];
     real target[COUNT];
+    real motion[COUNT];
     for (k = 0u; k < COUNT; ++k) {
       target[k] = samples[i][k + 1u];
+      if ((call % 2u) != 0u) {
+        target[k] = target[k] * LARGEST;
+      }
     }
-    if (call == 1u) {
-      target[0] = target[0] * LARGEST;
-    }
-    if (call == 2u) {
-      esokit_wait(&o);
-    } else if (call == 3u) {
+    if (call < 2u) {
+      (void)esokit_update(&o, target);
+    } else if (call < 4u) {
       (void)esokit_start(&o, target[0], target[1]);
     } else {
-      (void)esokit_update(&o, target);
+      esokit_wait(&o);
     }
+    esokit_motion(&o, motion);
     for (k = 0u; k < COUNT; ++k) {
-      if (!(fabs(o.motion[k] - samples[i][k + COUNT + 1u]) <= tolerance)) {
+      if (!(fabs(motion[k] - samples[i][k + COUNT + 1u]) <= tolerance)) {
         return (int)i + 1;
       }
     }
