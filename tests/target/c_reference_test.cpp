@@ -170,6 +170,7 @@ void follows(std::uint64_t seed, void (*change)(typename C::Config&) = nullptr,
     Random random(seed++ + asked("ESOKIT_WRITTEN_SEED", 0));
     int bad = 0;
     int moved = 0;
+    int rests = 0;
     int lost = 0;
     double u = 0;
     for (int k = 0; k < samples && !testing::Test::HasFailure(); ++k) {
@@ -184,6 +185,10 @@ void follows(std::uint64_t seed, void (*change)(typename C::Config&) = nullptr,
       Vector<V, count> r{};
       for (int i = 0; i < count; ++i) {
         r(i) = static_cast<V>(std::pow(0.5, i) * std::sin(0.004 * k + 1.6 * i));
+      }
+      if (k % 400 < 200) {
+        for (int i = 0; i < count; ++i)
+          r(i) = V(i == 0 ? 0.25 : random.index(30) == 0 ? -0.0 : 0.0);
       }
       if (random.index(100) == 0) r(random.index(count)) = anything<V>(random);
       if (random.index(200) == 0) {
@@ -205,10 +210,12 @@ void follows(std::uint64_t seed, void (*change)(typename C::Config&) = nullptr,
       EXPECT_EQ(in_c.probe() / 65536, static_cast<unsigned>(controller.observer().missed())) << k;
       bad += status >= 256;
       moved += std::fabs(mine) < V(2.4);
+      rests += controller.mode() == LoopMode::rest;
       u = static_cast<double>(mine);
     }
     EXPECT_GT(bad, samples / 4000);
     EXPECT_GT(moved, samples / 20);
+    EXPECT_TRUE(!detail::IsResting<C>::value || rests > samples / 50) << rests;
   }
 }
 
@@ -220,6 +227,7 @@ TEST(CReference, EqualsTheController) {
   follows<Adrc<LinearEso<3, double>>>(21);  // it softens
   follows<Adrc<CascadeEso<2, 3, double>>>(31);
   follows<Adrc<LinearEso<2, double>>>(41, nullptr, true);
+  follows<Resting<Adrc<LinearEso<2, float>>>>(61);
   follows<Adrc<LinearEso<2, float>>>(51, [](auto& settings) {
     settings.measurement_divider = 3;
     settings.missing.stay = true;

@@ -26,8 +26,8 @@ using namespace esokit;
 template <class C>
 typename C::Config plain_config() {
   auto settings = config<C>(8);
-  settings.limits.rate = Limits<typename C::scalar_type>{}.rate;
-  settings.start_hold = {};
+  of_controller(settings).limits.rate = Limits<typename C::scalar_type>{}.rate;
+  of_controller(settings).start_hold = {};
   return settings;
 }
 
@@ -59,9 +59,13 @@ TEST(CSaved, IsRefusedByName) {
 
 #ifdef ESOKIT_LOADS_C
 
-/// Samples that are missing, in which u acts.
+/// Samples that are missing, in which u acts, of something else than a controller that rests.
 template <class C, class V>
 void miss(C& controller, int samples, V u, V r) {
+  if constexpr (detail::IsResting<C>::value) {
+    for (int k = 0; k < samples; ++k) (void)controller.track(hidden_nan<V>(), r, u);
+    return;
+  }
   for (int k = 0; k < samples; ++k) {
     (void)controller.applied(u);
     (void)controller.update_without_measurement(r);
@@ -99,7 +103,8 @@ void goes_on(std::uint64_t seed) {
       const auto saved = in_c.save();
       const C before = controller;
       for (int i = random.index(5); i >= 0; --i) in_c.update(V(0.25), V(i));  // lost
-      const int samples = random.index(3) == 0 ? random.index(100) : random.index(8);
+      constexpr int least = detail::IsResting<C>::value ? 1 : 0;
+      const int samples = least + (random.index(3) == 0 ? random.index(100) : random.index(8));
       const V u = random.index(2) == 0 ? V(0) : static_cast<V>(random.uniform(-2, 2));
       EXPECT_FALSE(in_c.load(saved, 0, hidden_nan<V>()));
       ASSERT_TRUE(in_c.load(saved, static_cast<std::uint32_t>(samples), u));
@@ -128,6 +133,7 @@ TEST(CSaved, GoesOnAfterTheGap) {
   goes_on<Adrc<AlgebraicEso<2, double>>>(6);
   goes_on<Adrc<ExtendedStateFilter<2, float>>>(7);
   goes_on<Adrc<LinearEso<1, float>, ErrorBased>>(8);
+  goes_on<Resting<Adrc<LinearEso<2, double>>>>(9);
 #endif
 }
 

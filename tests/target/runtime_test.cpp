@@ -162,6 +162,7 @@ detail::RecordedDesign design_of(Random& random) {
   if (d.is_controller) {
     d.loop.divider = is() ? 3 : 1;
     d.softens = !d.compensates && is();
+    d.rest.on = !d.compensates && d.loop.divider == 1 && is();
   }
   if (!d.predictive && is()) {
     d.map = {{-3, 3}, {-0.5, 0.5}, {{2.5, 1, 1}, {0, 0.125, 8}, {-2.5, 1, 1}}};

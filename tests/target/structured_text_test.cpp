@@ -176,7 +176,7 @@ void controls_changed(std::uint64_t seed, const Change& change) {
       if constexpr (observer_traits<Observer>.wraps_output) y = std::remainder(y, V(2.5));
       y = odd(random, y);
       V given = r;
-      if constexpr (!requires { controller.gains(); }) given = (r - y) / static_cast<V>(gain);
+      if constexpr (is_compensator<C>) given = (r - y) / static_cast<V>(gain);
       given = odd(random, given);
       const V held = odd(random, static_cast<V>(random.uniform(-1, 1)));
       const bool starts = random.index(80) == 0;
@@ -210,14 +210,15 @@ void controls_changed(std::uint64_t seed, const Change& change) {
           .estimates(controller.observer());
       odd_ones += controller.status() != StepStatus::ok;
     }
-    EXPECT_GT(odd_ones, samples_each / (30 * settings.measurement_divider));
+    EXPECT_GT(odd_ones, samples_each / (30 * of_controller(settings).measurement_divider));
     interprets(block, samples);
   }
 }
 
 template <class C>
 void controls(std::uint64_t seed, int divider = 1) {
-  controls_changed<C>(seed, [divider](auto& settings) { settings.measurement_divider = divider; });
+  controls_changed<C>(
+      seed, [divider](auto& settings) { of_controller(settings).measurement_divider = divider; });
 }
 
 template <class Observer>
@@ -269,6 +270,7 @@ TEST(StructuredText, OfControllers) {
   controls<Adrc<LinearEso<1, float>, ErrorBased>>(31, 3);
   controls<Adrc<DelayedInput<ModelEso<lag, float>, 4>>>(41);
   controls<Adrc<OutlierGate<LinearEso<2, float>>>>(51);
+  controls<Resting<Adrc<LinearEso<2, float>>>>(55);
   controls<DisturbanceCompensator<AdjustableBandwidthEso<1, double>>>(61);
 #endif
 }
@@ -293,6 +295,7 @@ void moves(std::uint64_t seed) {
     Vector<V, 3> r{};
     for (int i = 0; i < 3; ++i) {
       r(i) = odd(random, static_cast<V>(std::pow(0.5, i) * std::sin(0.004 * k + 1.6 * i)));
+      if (k % 200 < 100) r(i) = odd(random, V(0));
     }
     const bool lost = random.index(12) == 0;
     const V u = lost ? controller.update_without_measurement(r) : controller.update(y, r);
@@ -308,6 +311,7 @@ TEST(StructuredText, OfAReferenceThatMoves) {
   moves<Adrc<LinearEso<2, double>>>(701);
 #ifndef ESOKIT_ONE_TYPE
   moves<Adrc<WrappedOutput<LinearEso<2, float>>>>(711);
+  moves<Resting<Adrc<WrappedOutput<LinearEso<2, double>>>>>(721);
 #endif
   const auto block = to_structured_text(
       PredictiveAdrc<LinearEso<2>>::make(
@@ -695,15 +699,17 @@ template <class C>
 void adopts_in_text(std::uint64_t seed) {
   SCOPED_TRACE(testing::internal::GetTypeName<C>());
   using V = typename C::scalar_type;
-  auto settings = config<C>(8);
-  C controller = C::make(settings).value();
+  auto all = config<C>(8);
+  auto& settings = of_controller(all);
+  C controller = C::make(all).value();
   const C first = controller;
   innermost(settings).observer_bandwidth = V(20);
   settings.controller_bandwidth = V(3);
   settings.limits = {V(-1), V(1.5), V(60)};
-  const C second = C::make(settings).value();
+  if constexpr (detail::IsResting<C>::value) all.rest.error = V(0.25);
+  const C second = C::make(all).value();
   settings.missing.most = 3;  // not one of the settings
-  const C third = C::make(settings).value();
+  const C third = C::make(all).value();
   CodeOptions options{.name = "loop", .settings_in_struct = true};
   const auto block = to_structured_text(first, options).value();
   std::string sets = to_structured_settings(first, options).value();
@@ -739,6 +745,7 @@ TEST(StructuredText, AdoptsSettings) {
   if (!there("python3")) GTEST_SKIP() << "no python3";
   adopts_in_text<Adrc<LinearEso<2, double>>>(601);
   adopts_in_text<Adrc<OutlierGate<CascadeEso<1, 2, float>>>>(611);
+  adopts_in_text<Resting<Adrc<LinearEso<2, float>>>>(621);
 }
 
 #endif

@@ -134,15 +134,31 @@ void slow_down(Config& schedule) {
 template <class C>
 auto config(double input_gain) {
   using V = typename C::scalar_type;
-  typename C::Config config{};
-  config.observer = observer_config<typename detail::ObserverOfController<C>::type>(input_gain);
-  if constexpr (requires { config.controller_bandwidth; }) {
-    config.controller_bandwidth = C::order == 3 ? V(1.5) : V(4);
+  if constexpr (requires(C c) { c.controller(); }) {
+    using Controller = std::remove_cvref_t<decltype(std::declval<C>().controller())>;
+    return typename C::Config{.controller = config<Controller>(input_gain),
+                              .rest = {.error = V(1), .time = V(0.03)}};
+  } else {
+    typename C::Config config{};
+    config.observer = observer_config<typename detail::ObserverOfController<C>::type>(input_gain);
+    if constexpr (requires { config.controller_bandwidth; }) {
+      config.controller_bandwidth = C::order == 3 ? V(1.5) : V(4);
+    }
+    config.limits = {V(-3), V(2.5), V(60)};
+    config.start_hold = {.time = V(0.1), .input = V(0.5)};
+    config.missing = {.most = 9, .input = V(-0.5)};
+    return config;
   }
-  config.limits = {V(-3), V(2.5), V(60)};
-  config.start_hold = {.time = V(0.1), .input = V(0.5)};
-  config.missing = {.most = 9, .input = V(-0.5)};
-  return config;
+}
+
+/// The settings of the controller in a Resting, or of itself.
+template <class Config>
+auto& of_controller(Config& config) {
+  if constexpr (requires { config.controller; }) {
+    return config.controller;
+  } else {
+    return config;
+  }
 }
 
 inline constexpr ModelParts lag{.order = 1, .actuator = 1};
@@ -398,7 +414,7 @@ inline std::uint64_t asked(const char* name, std::uint64_t usual) {
 }
 
 struct Seen {
-  int odd = 0, limited = 0, safe = 0, bad_references = 0;
+  int odd = 0, limited = 0, safe = 0, bad_references = 0, rests = 0;
   int of_status[64] = {};
 };
 
@@ -468,6 +484,11 @@ void tell_guard(Object& object, Guard& guarded, InC<V>& in_c, Random& random, do
   }
 }
 
+template <class C>
+inline constexpr bool is_compensator = false;
+template <class Observer>
+inline constexpr bool is_compensator<DisturbanceCompensator<Observer>> = true;
+
 /// Both in the same loop, so many samples. @return what was met
 template <class C>
 Seen compare(const C& fresh, InC<typename C::scalar_type>& in_c, double input_gain, int samples,
@@ -510,7 +531,7 @@ Seen compare(const C& fresh, InC<typename C::scalar_type>& in_c, double input_ga
     }
     tell_measured(controller, in_c, random, k);
     V given = r;
-    if constexpr (!requires { controller.gains(); }) given = (r - y) / static_cast<V>(input_gain);
+    if constexpr (is_compensator<C>) given = (r - y) / static_cast<V>(input_gain);
     if (bad_for > 0 || random.index(400) == 0) given = anything<V>(random);
     if (bad_for > 0) --bad_for;
     if (random.index(1000) == 0) bad_for = random.index(30);
@@ -565,6 +586,7 @@ Seen compare(const C& fresh, InC<typename C::scalar_type>& in_c, double input_ga
     seen.odd += status != 0;
     seen.limited += !equal_bits(controller.output(), controller.requested());
     seen.safe += controller.mode() == LoopMode::safe;
+    seen.rests += controller.mode() == LoopMode::rest;
     seen.bad_references += has(controller.status(), StepStatus::reference_rejected);
     ++seen.of_status[status % 64];
     if (testing::Test::HasFailure()) return seen;
@@ -584,7 +606,7 @@ void equals_changed(int samples, std::uint64_t seed, const std::string& compiler
   for (const double input_gain : {8.0, -8.0}) {
     auto settings = config<C>(input_gain);
     change(settings);
-    const int divider = settings.measurement_divider;
+    const int divider = of_controller(settings).measurement_divider;
     const C controller = C::make(settings).value();
     const CCode code = to_c(controller, {.name = "loop", .comment = "a test"}).value();
     InC<V> in_c(folder, code, true, compiler);
@@ -594,6 +616,9 @@ void equals_changed(int samples, std::uint64_t seed, const std::string& compiler
     EXPECT_GT(seen.odd, samples / 100);
     EXPECT_GT(seen.limited, samples / 10);
     EXPECT_GT(seen.bad_references, samples / 4000);
+    if constexpr (detail::IsResting<C>::value) {
+      EXPECT_GT(seen.rests, samples / 300);
+    }
     // Of fewer measurements more have to be lost.
     EXPECT_GT(seen.safe, samples / (500 * divider));
     for (const StepStatus status :
@@ -606,8 +631,9 @@ void equals_changed(int samples, std::uint64_t seed, const std::string& compiler
 template <class C>
 void equals_controller(int samples, std::uint64_t seed,
                        const std::string& compiler = "gcc -std=c99", int divider = 1) {
-  equals_changed<C>(samples, seed, compiler,
-                    [divider](auto& settings) { settings.measurement_divider = divider; });
+  equals_changed<C>(samples, seed, compiler, [divider](auto& settings) {
+    of_controller(settings).measurement_divider = divider;
+  });
 }
 
 template <class Observer>
@@ -732,20 +758,25 @@ template <class C>
 void adopts(std::uint64_t seed, bool is_slow, double bandwidth = 0) {
   SCOPED_TRACE(testing::internal::GetTypeName<C>());
   using V = typename C::scalar_type;
-  auto settings = config<C>(8);
+  auto all = config<C>(8);
+  auto& settings = of_controller(all);
   const V rate = is_slow ? V(60) : esokit::Limits<V>{}.rate;
   settings.limits.rate = rate;
   if (bandwidth > 0) {
     innermost(settings).observer_bandwidth = V(bandwidth);
     innermost(settings).max_gap = 20;
   }
-  const C first = C::make(settings).value();
+  const C first = C::make(all).value();
   innermost(settings).observer_bandwidth = bandwidth > 0 ? V(0.7 * bandwidth) : V(20);
   if constexpr (requires { settings.controller_bandwidth; }) settings.controller_bandwidth = V(3);
   settings.limits = {V(-1), V(1.5), rate};
-  const C second = C::make(settings).value();
+  if constexpr (detail::IsResting<C>::value) {
+    all.rest = {};
+    if (!is_slow) all.rest = {.error = V(0.5), .time = V(0.05)};
+  }
+  const C second = C::make(all).value();
   settings.missing.most = 3;  // not one of the settings
-  const C third = C::make(settings).value();
+  const C third = C::make(all).value();
   CodeOptions options{.name = "loop", .comment = "a test", .settings_in_struct = true};
   CCode code = to_c(first, options).value();
   options.comment = "another";
@@ -785,11 +816,13 @@ void adopts(std::uint64_t seed, bool is_slow, double bandwidth = 0) {
   Random random(seed);
   V r(1);
   int limited = 0;
+  int rests = 0;
   int lost = 0;
   for (int k = 0; k < 30000 && !testing::Test::HasFailure(); ++k) {
     plant.step(static_cast<double>(mine.output()));
     if (random.index(60) == 0) r = static_cast<V>(random.uniform(-4, 4));
     V y = static_cast<V>(plant.output() + 1e-3 * random.uniform(-1, 1));
+    if (detail::IsResting<C>::value && k % 200 < 100) y = r + V(0.25);
     if (random.index(20) == 0) y = random.index(2) == 0 ? hidden_nan<V>() : anything<V>(random);
     if (random.index(10) == 0) {
       const V told = random.index(2) == 0 ? static_cast<V>(random.uniform(-5, 5)) : mine.output();
@@ -807,7 +840,7 @@ void adopts(std::uint64_t seed, bool is_slow, double bandwidth = 0) {
       EXPECT_FALSE(adopt(state.data(), sets[2]));
     }
     V given = r;
-    if constexpr (!requires { mine.gains(); }) given = (r - y) / V(8);
+    if constexpr (is_compensator<C>) given = (r - y) / V(8);
     if (random.index(20) == 0 || set < 2) given = hidden_nan<V>();
     const V u = mine.update(y, given);
     EXPECT_TRUE(equal_bits(u, update(state.data(), y, given))) << "sample " << k;
@@ -817,8 +850,10 @@ void adopts(std::uint64_t seed, bool is_slow, double bandwidth = 0) {
           << "sample " << k << ", estimate " << row;
     });
     limited += !equal_bits(mine.output(), mine.requested());
+    rests += mine.mode() == LoopMode::rest;
   }
   EXPECT_GT(limited, 3000);
+  EXPECT_TRUE(!detail::IsResting<C>::value || rests > 600) << rests;
 }
 
 #endif  // ESOKIT_LOADS_C

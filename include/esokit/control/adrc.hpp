@@ -244,7 +244,7 @@ requires(detail::goes_into_a_loop<Observer>()) class Adrc {
   /// Said twice before an `update`, both count; a `retune` in between changes nothing of it. If the
   /// scalar cannot hold the rate limit over it, it is refused and does not count.
   ///
-  /// `to_c` refuses VariableTime: a step of another length designs the observer anew.
+  /// `to_c` refuses VariableTime, and says what to do instead.
   template <class O = Observer>
   requires(observer_traits<O>.varies_time) Check<S> elapsed(const S& seconds)
   noexcept {

@@ -68,8 +68,7 @@ requires(detail::can_rest<Controller>()) struct RestingConfig {
 /// Around MappedInput give a dead zone a softness of a fourth of its width: of a u that jumps from
 /// one side of it to the other, either would be held (examples/actuator).
 ///
-/// `to_c` does not write it: it records what each sample computes, and here a sample may be taken
-/// back.
+/// `to_c` writes it, too; not in fixed point.
 template <class Controller>
 requires(detail::can_rest<Controller>()) class Resting {
   using Observer = std::remove_cvref_t<decltype(std::declval<const Controller&>().observer())>;
@@ -128,6 +127,19 @@ requires(detail::can_rest<Controller>()) class Resting {
     return controller_.track(y, reference, u_applied);
   }
 
+  /// Something else holds the plant, see Adrc::hold.
+  S hold(S y, S reference, S u_applied) noexcept
+      requires(observer_traits<Observer>.gates_disturbance) {
+    leave();
+    return controller_.hold(y, reference, u_applied);
+  }
+
+  /// Another b0, see Adrc::set_input_gain.
+  Check<S> set_input_gain(const S& b) noexcept
+      requires(observer_traits<Observer>.schedules_input_gain) {
+    return controller_.set_input_gain(b);
+  }
+
   /// Takes over a plant at rest at y under u, see Adrc::start. @{
   StatusOf<S> start(S y, S u) noexcept { return start(y, u, y); }
   StatusOf<S> start(S y, S u, S reference) noexcept {
@@ -179,6 +191,7 @@ requires(detail::can_rest<Controller>()) class Resting {
 
  private:
   friend struct detail::LaneAccess;
+  friend struct detail::RecordAccess;
   static constexpr int data_members = 5;
 
   Resting(const Controller& controller, const S& error, const S& samples) noexcept
@@ -200,13 +213,12 @@ requires(detail::can_rest<Controller>()) class Resting {
     if constexpr (traits.varies_time) {
       if (controller_.too_soon()) return;  // no sample: nothing changes
     }
-    if (!(error_ > S(0))) return leave();
     const bool same = stays(reference);
-    r_ = reference(0);
-    if (!same) return leave();
-    if (controller_.mode() != LoopMode::running && controller_.mode() != LoopMode::rest) {
-      inside_ = 0;
-    } else if (is_finite(y)) {
+    if (is_finite(reference(0))) r_ = reference(0);
+    const LoopMode mode = controller_.mode();
+    const bool acts = mode == LoopMode::running || mode == LoopMode::rest;
+    if (!(error_ > S(0)) || !same || !acts) return leave();
+    if (is_finite(y)) {
       const S error = detail::wrapped(controller_.observer(), S(r_ - y));
       if (!(detail::absolute(error) <= error_)) return leave();
       if (inside_ <= samples_) ++inside_;

@@ -59,7 +59,7 @@ CCode c_code(const RecordedDesign& design);
 /// - these in MappedInput (the curve is no setting);
 /// - these in Measured, not around WrappedOutput or another Measured, and not in Guarded;
 /// - LinearEso and CascadeEso in Guarded (a changing b0 unless the law softens);
-/// - Adrc of both forms and DisturbanceCompensator around all of these;
+/// - Adrc of both forms, also in Resting, and DisturbanceCompensator around all of these;
 /// - PredictiveAdrc around one without an adapter whose gain is known before the measurement (not
 ///   AdjustableBandwidthEso or NonlinearEso), so EPADRC around ExtendedStateFilter, too.
 ///
@@ -68,6 +68,10 @@ CCode c_code(const RecordedDesign& design);
 /// with `with_scalar`. It adds, multiplies and compares numbers of the observer's scalar (and
 /// integers), and calls abs, sqrt, pow, exp, expm1, sin, cos, tan, atan and tanh as by `using
 /// std::sin;`. A branch on a value does not compile: `select(condition, a, b)` chooses.
+///
+/// Not VariableTime: a step of another length designs the observer anew. Write the observer of a
+/// fixed T; after a pause of k T call `name_update_without_measurement` k - 1 times, then
+/// `name_update`.
 ///
 /// SmoothProfile, ApproachProfile and FollowProfile, TimeProportioned, HealthMonitor:
 /// target/profile_code.hpp, target/time_proportioned_code.hpp and target/health_code.hpp.
@@ -91,6 +95,10 @@ Expected<CCode, Error<typename Object::scalar_type>> to_c(const Object& object,
 /// What cannot be written yet, by name.
 template <class Other>
 void to_c(const Other&, const CodeOptions& = {}) {
+  static_assert(!detail::TakesAnyTime<Other>,
+                "esokit: to_c does not write VariableTime, whose steps of another length design "
+                "the observer anew: write it of a fixed T, and after a pause of k T call "
+                "update_without_measurement k - 1 times before update");
   static_assert(detail::knows_in_general<Other>,
                 "esokit: to_c records the function of a KnownModel: it has to be generic, template "
                 "<class E> auto operator()(const E& x) const noexcept, in numbers of the "
@@ -102,9 +110,9 @@ void to_c(const Other&, const CodeOptions& = {}) {
       "ExtendedStateFilter, these in DelayedInput, OutlierGate, WrappedOutput, Measured and "
       "MappedInput, in "
       "KnownModel (not AlgebraicEso), on the chain with one extended state in Guarded, and "
-      "Adrc and DisturbanceCompensator around them, and PredictiveAdrc around one without an "
-      "adapter whose gain does not depend on the innovation; no other gains, adapters or "
-      "controllers yet");
+      "Adrc (also in Resting) and DisturbanceCompensator around them, and PredictiveAdrc around "
+      "one without an adapter whose gain does not depend on the innovation; no other gains, "
+      "adapters or controllers yet");
 }
 
 }  // namespace esokit

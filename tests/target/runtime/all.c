@@ -12,4 +12,5 @@
 #include <esokit/target/runtime/map.c>
 #include <esokit/target/runtime/guard.c>
 #include <esokit/target/runtime/predictive.c>
+#include <esokit/target/runtime/rest.c>
 #include <esokit/target/runtime/controller.c>

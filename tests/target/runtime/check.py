@@ -22,7 +22,7 @@ KINDS = [{"CONTROLLER"}, {"CONTROLLER", "ERROR_BASED"}, {"CONTROLLER", "COMPENSA
          {"PREDICTIVE", "WAITS"}, set()]
 LAWS = [{"TABLE", "GAIN_IS_KEPT"}, {"TABLE"}, {"SCHEDULE"}, {"FILTER"}, {"FILTER", "RETURNS"},
         {"FILTER", "WATCHED"}, {"FILTER", "RETURNS", "WATCHED"}]
-OF_LOOPS = ["DIVIDED", "STAYS_SAFE", "HOLDS_SAFE", "SOFTENS", "MONITORED"]
+OF_LOOPS = ["DIVIDED", "RESTS", "STAYS_SAFE", "HOLDS_SAFE", "SOFTENS", "MONITORED"]
 GUARDS = [set(), {"GUARDED"}, {"GUARDED", "BOUNDED"}, {"GUARDED", "LEAKS"}, {"GUARDED", "BOUND_OF_U"},
           {"GUARDED", "BOUNDED", "BOUND_OF_U", "LEAKS"}]
 W = [set(), {"MEASURED", "ONE_W"}, {"MEASURED"}]
@@ -46,6 +46,7 @@ def valid(has):
         or ("SETTINGS" in has and (not kept or "SOFTENS" in has))
         or ("RECOVERS" in has and "TABLE" not in has)
         or ("SOFTENS" in has and "COMPENSATOR" in has)
+        or ("RESTS" in has and has & {"COMPENSATOR", "DIVIDED"})
         or ("KNOWN" in has and "SCHEDULE" in has)
         or ("MOVES" in has and ("ERROR_BASED" in has or "COMPENSATOR" in has or
                                 not (loop or "PREDICTIVE" in has)))

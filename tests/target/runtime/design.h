@@ -36,8 +36,21 @@ typedef double real;
 #else
 #define DESIGN_RECOVERED
 #endif
-#define DESIGN_SET_OF_SETTINGS \
-  const esokit_settings esokit_design = {DESIGN_MARK, number(1.0), {DESIGN_GAINS} DESIGN_RECOVERED};
+#if ESOKIT_RESTS
+#define DESIGN_RESTS , number(0.4), 6u
+#else
+#define DESIGN_RESTS
+#endif
+#if ESOKIT_SETTINGS
+#define REST_ERROR o->settings->rest_error
+#define REST_SAMPLES o->settings->rest_samples
+#else
+#define REST_ERROR number(0.4)
+#define REST_SAMPLES 6u
+#endif
+#define DESIGN_SET_OF_SETTINGS                                              \
+  const esokit_settings esokit_design = {DESIGN_MARK, number(1.0), {DESIGN_GAINS} DESIGN_RECOVERED \
+                                             DESIGN_RESTS};
 #define DESIGN_RECOVERY 0u
 #define MAX_BRIDGED 1u
 #define LAST_ROW 0u
@@ -104,6 +117,7 @@ typedef double real;
 #define DESIGN_MOTION r1, r2
 #define DESIGN_R_AT_REST y, number(0.0), number(0.0)
 #define DESIGN_R_IS_FINITE is_finite(r) && is_finite(r1) && is_finite(r2)
+#define DESIGN_R_STANDS stands(r1) && stands(r2)
 #define DESIGN_SAMPLE_R r, given[2], given[3]
 #define DESIGN_VECTORS {number(0.0), number(0.0), number(0.0), number(0.0), number(0.0)}
 #define COLUMNS 5u

@@ -38,6 +38,8 @@ inline const std::vector<const char*> source = {
     ,
 #include <esokit/target/runtime/predictive.c>
     ,
+#include <esokit/target/runtime/rest.c>
+    ,
 #include <esokit/target/runtime/controller.c>
 };
 

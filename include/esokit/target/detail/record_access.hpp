@@ -116,6 +116,15 @@ struct RecordAccess {
     }
   }
 
+  /// @param others whether other settings may follow
+  template <class C>
+  static RestNumbers rest_of(const C& c, bool others) noexcept {
+    using S = typename C::scalar_type;
+    const bool may = c.error_ > S(0) || (others && c.controller().measurement_divider() == 1);
+    return {may,       static_cast<double>(c.error_), c.samples_, static_cast<double>(c.r_),
+            c.inside_, c.mode() == LoopMode::rest};
+  }
+
   // ---- A controller in two phases.
 
   template <class Numbers, class C>

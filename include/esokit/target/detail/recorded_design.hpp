@@ -425,9 +425,13 @@ void take_samples(RecordedDesign& design, C played) {
         if (given || call == TestCall::starts || call == TestCall::reports) {
           return V(estimate_of(played.observer(), row));
         }
-        if (call != TestCall::misses) return V(played.update(y, reference<inputs>(beside)));
+        const bool rests = call == TestCall::rests;
+        if (!rests && call != TestCall::misses) {
+          return V(played.update(y, reference<inputs>(beside)));
+        }
         for (int left = static_cast<int>(y); left > 0; --left) {
-          (void)played.update_without_measurement(reference<inputs>(beside));
+          (void)(rests ? played.update(beside(0), reference<inputs>(beside))
+                       : played.update_without_measurement(reference<inputs>(beside)));
         }
         return V(played.output());
       },
@@ -537,7 +541,8 @@ Expected<RecordedDesign, Error<typename C::scalar_type>> recorded_design(
   using Bare = typename WithoutAdapter<C>::type;
   using Maker = DesignRecorder<Bare, typename WithoutAdapter<typename Of::type>::type>;
 
-  constexpr bool takes_motion = !Of::error_based && requires { controller.gains(); };
+  constexpr bool has_law = requires(const Bare& bare) { bare.gains(); };
+  constexpr bool takes_motion = !Of::error_based && has_law;
   if (const auto rules = checked_options<V>(options, takes_motion); !rules) return rules.error();
   const Bare bare = without_adapter(controller);
   Maker maker(bare, options);
@@ -546,14 +551,17 @@ Expected<RecordedDesign, Error<typename C::scalar_type>> recorded_design(
   design.loop = Access::rules(Access::loop(bare));
   design.error_based = Of::error_based;
   design.softens = Access::softens(bare);
-  design.compensates = !requires { controller.gains(); };
+  design.compensates = !has_law;
+  if constexpr (IsResting<C>::value) {
+    design.rest = Access::rest_of(controller, options.settings_in_struct);
+  }
   design.lower = static_cast<double>(controller.limiter().lower());
   design.upper = static_cast<double>(controller.limiter().upper());
   take_rate(design, controller.limiter());
   take_adapters(design, controller.observer());
   design.law = Access::law_numbers(Access::core(bare.observer()));
-  if constexpr (requires { controller.gains(); }) {
-    for (const V& k : controller.gains()) design.law_gains.push_back(static_cast<double>(k));
+  if constexpr (has_law) {
+    for (const V& k : bare.gains()) design.law_gains.push_back(static_cast<double>(k));
   }
 
   if (auto ok = record_controller(maker); !ok) return ok.error();

@@ -170,6 +170,16 @@ struct MapNumbers {
   std::vector<std::array<double, 3>> lines{};  ///< offset, slope and inverse, one more
 };
 
+/// A Resting, and what it has seen.
+struct RestNumbers {
+  bool on = false;  ///< with these settings or others it may rest
+  double error = 0;
+  unsigned samples = 0;
+  double reference = 0;
+  unsigned inside = 0;
+  bool rests = false;
+};
+
 /// A finished design as lists and counts, without its type.
 struct RecordedDesign {
   CodeOptions options{};
@@ -201,6 +211,7 @@ struct RecordedDesign {
   std::vector<std::uint16_t> recovery{};  ///< of a row of gap_gains: 1 + what is due after it
   bool recovers = false;                  ///< whether with some setting something may be due
   LoopRules loop{};
+  RestNumbers rest{};
   double lower = 0;
   double upper = 0;
   double rate = 0;     ///< largest change of u in a sample; 0: any
@@ -213,6 +224,10 @@ struct RecordedDesign {
   std::vector<std::vector<double>> samples{};  ///< y, r or u, and the result
   std::vector<unsigned> test_calls{};          ///< what of it is called, see self_test.hpp
 
+  /// The mode in which it begins.
+  [[nodiscard]] unsigned mode() const {
+    return rest.rests ? 3 : (predictive ? hold : loop.hold_left) > 0 ? 1 : 0;
+  }
   /// How many numbers the reference is.
   [[nodiscard]] int references() const { return options.moving_reference ? order + 1 : 1; }
   /// Their names: `r`, r1, ..

@@ -25,7 +25,8 @@ enum class TestCall : unsigned {
   corrects,  ///< of an observer
   splits,    ///< the two phases, with a report between them
   loses,     ///< the same without a measurement
-  measures   ///< a disturbance w
+  measures,  ///< a disturbance w
+  rests      ///< y times a sample with y at r
 };
 
 inline constexpr unsigned bad_y = 16;       ///< y is infinite
@@ -47,6 +48,7 @@ struct PlannedCall {
 /// What the calls of a self-test depend on.
 struct TestNumbers {
   unsigned longest;  ///< gap that has a gain, samples
+  unsigned rest;     ///< samples until it rests; 0: never
   unsigned limit;    ///< of missing measurements, samples
   double largest;    ///< number
   double huge;       ///< u, which a start still takes
@@ -81,6 +83,7 @@ inline PlannedCall planned(int sample, const TestNumbers& of) {
       PlannedCall{53, TestCall::misses, 0, 1},
       PlannedCall{54, TestCall::corrects},
       PlannedCall{55, TestCall::measures, 0, 0.125},
+      PlannedCall{57, TestCall::rests, 0, many(of.rest)},
       PlannedCall{58, TestCall::measures, bad_y, 4},
       PlannedCall{60, TestCall::resets},
       PlannedCall{62, TestCall::resets, bad_y, 4},
@@ -99,7 +102,8 @@ inline PlannedCall planned(int sample, const TestNumbers& of) {
   };
   const auto* const found =
       std::find_if(all.begin(), all.end(), [=](const auto& one) { return one.sample == sample; });
-  return found == all.end() ? PlannedCall{sample, TestCall::update} : *found;
+  const bool is_update = found == all.end() || (found->call == TestCall::rests && of.rest == 0);
+  return is_update ? PlannedCall{sample, TestCall::update} : *found;
 }
 
 /// The plant of the design, exact for a u that is held: y^(n) = b0 u.
@@ -148,6 +152,7 @@ void take_self_test(RecordedDesign& design, double law, Calls&& calls, Output&& 
   const auto most = static_cast<double>(largest);
   const TestNumbers numbers{
       .longest = static_cast<unsigned>((std::max)(design.gap_gains.size(), std::size_t{1})),
+      .rest = design.rest.error > 0 ? design.rest.samples + 3 : 0,
       .limit = design.loop.missing_limit,
       .largest = most,
       .huge = 0.25 * most / (std::max)(1.0, std::abs(design.input_gain)),
@@ -168,7 +173,8 @@ void take_self_test(RecordedDesign& design, double law, Calls&& calls, Output&& 
     V y = number(plan.y);
     Vector<V, inputs> beside;
     for (int i = 1; i < inputs; ++i) {
-      beside(i) = number(size * (0.125 * ((k * 11 + i) % 9) - 0.5));
+      const bool stands = plan.call == TestCall::rests;
+      beside(i) = stands ? V(0) : number(size * (0.125 * ((k * 11 + i) % 9) - 0.5));
     }
     beside(0) = number(!std::isnan(plan.beside) ? plan.beside
                        : (k / 10) % 2 == 0      ? size

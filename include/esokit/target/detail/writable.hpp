@@ -12,6 +12,7 @@
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/control/predictive_adrc.hpp>
+#include <esokit/control/resting.hpp>
 #include <esokit/target/detail/record_access.hpp>
 #include <esokit/target/detail/recorded_numbers.hpp>
 #include <esokit/target/recorder.hpp>
@@ -53,6 +54,10 @@ template <class Observer>
 struct IsMapped : std::false_type {};
 template <class Observer, int Points>
 struct IsMapped<MappedInput<Observer, Points>> : std::true_type {};
+template <class C>
+struct IsResting : std::false_type {};
+template <class Controller>
+struct IsResting<Resting<Controller>> : std::true_type {};
 template <class Observer>
 inline constexpr bool is_adapter =
     IsDelayed<Observer>::value || IsGate<Observer>::value || IsWrapped<Observer>::value ||
@@ -108,6 +113,8 @@ template <class Observer, class Form>
 struct WithoutAdapter<Adrc<Observer, Form>> {
   using type = Adrc<typename WithoutAdapter<Observer>::type, Form>;
 };
+template <class Controller>
+struct WithoutAdapter<Resting<Controller>> : WithoutAdapter<Controller> {};
 template <class Observer>
 struct WithoutAdapter<DisturbanceCompensator<Observer>> {
   using type = DisturbanceCompensator<typename WithoutAdapter<Observer>::type>;
@@ -123,6 +130,8 @@ void take_off_adapter(To& to, const From& from) {
     to = from;
   } else if constexpr (is_adapter<From>) {
     take_off_adapter(to, from.observer());
+  } else if constexpr (IsResting<From>::value) {
+    take_off_adapter(to, from.controller());
   } else if constexpr (!std::is_empty_v<To>) {
     LaneAccess::with_members(to, [&](auto&... into) {
       LaneAccess::with_members(
@@ -133,6 +142,12 @@ void take_off_adapter(To& to, const From& from) {
 /// @}
 
 // ---- What can be written.
+
+/// Of any elapsed time, which is not.
+template <class Object>
+concept TakesAnyTime = requires {
+  requires Object::traits.varies_time;
+};
 
 /// A law whose gain after a gap is a row of a table.
 template <class Law>
@@ -171,6 +186,8 @@ inline constexpr bool knows_in_general<Adrc<Observer, Form>> = knows_in_general<
 template <class Observer>
 inline constexpr bool knows_in_general<DisturbanceCompensator<Observer>> =
     knows_in_general<Observer>;
+template <class Controller>
+inline constexpr bool knows_in_general<Resting<Controller>> = knows_in_general<Controller>;
 
 /// What the curve of an actuator is around.
 template <class Observer>
@@ -201,6 +218,8 @@ struct ObserverOfController<DisturbanceCompensator<Observer>> {
   using type = Observer;
   static constexpr bool error_based = false;
 };
+template <class Controller>
+struct ObserverOfController<Resting<Controller>> : ObserverOfController<Controller> {};
 /// A controller around such an observer.
 template <class C>
 concept WritableController = WritableObserver<typename ObserverOfController<C>::type>;

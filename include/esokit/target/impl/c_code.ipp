@@ -82,6 +82,7 @@ class CDesign {
     set_features();
     set_constants();
     if (design.guard.on) set_guard();
+    if (design.rest.on) set_rest();
     if (design.measured.on) set_measured();
     set_map();
     set_rows();
@@ -131,6 +132,7 @@ class CDesign {
                     {"ESOKIT_COMPENSATOR", d.compensates},
                     {"ESOKIT_SOFTENS", d.softens},
                     {"ESOKIT_DIVIDED", d.loop.divider > 1},
+                    {"ESOKIT_RESTS", d.rest.on},
                     {"ESOKIT_STAYS_SAFE", d.loop.stays_safe},
                     {"ESOKIT_HOLDS_SAFE", d.loop.holds_safe},
                     {"ESOKIT_MONITORED", d.options.watched},
@@ -178,7 +180,7 @@ class CDesign {
                   {"MISSING_LIMIT", d.loop.missing_limit}});
     text_.constant("DESIGN_NUMBER", hash_.empty() ? "0u" : "0x" + hash_ + "u");
     text_.counts({{"HOLD_SAMPLES", hold},
-                  {"FIRST_MODE", hold > 0 ? 1 : 0},
+                  {"FIRST_MODE", d.mode()},
                   {"FIRST_PHASE", d.loop.elsewhere ? 5 : 0},
                   {"FIRST_ELSEWHERE", d.loop.elsewhere ? 1 : 0}});
     text_.numbers({{"FIRST_KEPT", d.loop.kept},
@@ -195,6 +197,17 @@ class CDesign {
                    {"HALF_PERIOD", d.wrap.period * 0.5},
                    {"QUARTER_PERIOD", d.wrap.period * 0.25},
                    {"MOST_TURNS", d.wrap.most_turns}});
+  }
+
+  void set_rest() {
+    const RestNumbers& rest = design_.rest;
+    if (design_.options.settings_in_struct) {
+      text_.replace("REST_ERROR", "o->settings->rest_error");
+      text_.replace("REST_SAMPLES", "o->settings->rest_samples");
+    } else {
+      text_.number("REST_ERROR", rest.error);
+      text_.count("REST_SAMPLES", rest.samples);
+    }
   }
 
   void set_guard() {
@@ -350,6 +363,7 @@ class CDesign {
            {"rejected", d.wrap.seen_rejected}});
     }
     if (d.guard.on) set_found(d.guard);
+    if (d.rest.on) set("", {{"r_before", d.rest.reference}}, {{"inside", d.rest.inside}});
   }
   void set_turns(const std::string& of, const TurnNumbers& turns) {
     set(of, {{"angle", turns.y}, {"turns", turns.turns}, {"motion", turns.motion}},
@@ -422,9 +436,15 @@ class CDesign {
     text_.replace("DESIGN_R_AT_REST", listed(names, [&](const std::string& name) {
                     return name == "r" ? "y" : writer_.number(0);
                   }));
-    std::string finite;
-    for (const auto& name : names) finite += (finite.empty() ? "" : " && ") + is_finite(name);
-    text_.replace("DESIGN_R_IS_FINITE", finite);
+    const auto all = [&](const std::string& of, std::size_t first) {
+      std::string text;
+      for (std::size_t i = first; i < names.size(); ++i) {
+        text += (text.empty() ? "" : " && ") + of + "(" + names[i] + ")";
+      }
+      return text;
+    };
+    text_.replace("DESIGN_R_IS_FINITE", all("is_finite", 0));
+    text_.replace("DESIGN_R_STANDS", all("stands", 1));
     text_.replace("DESIGN_REFERENCE", d.compensates ? "the u0 of the controller that is helped"
                                       : names.size() > 1
                                           ? "the reference, with its derivatives r1, .."
@@ -439,8 +459,6 @@ class CDesign {
             ? "y, u, the disturbance"
             : "y, " + listed(d.references(d.predictive ? "next r" : "r"), itself) + ", u");
   }
-  static std::string is_finite(const std::string& name) { return "is_finite(" + name + ")"; }
-
   std::string recovery() const {
     return listed(design_.recovery, [](unsigned due) { return std::to_string(due) + "u"; });
   }
@@ -456,6 +474,10 @@ class CDesign {
     set += ",\n  {\n" + writer_.rows(design_.gap_gains) + "  }";
     if (design_.recovers) {
       set += ",\n  {" + recovery() + "},\n  " + std::to_string(design_.max_gap + 1) + "u";
+    }
+    if (design_.rest.on) {
+      set += ",\n  " + writer_.number(design_.rest.error) + ",\n  " +
+             std::to_string(design_.rest.samples) + "u";
     }
     return set + "\n};\n\n";
   }
@@ -507,6 +529,8 @@ inline RecordedDesign without_settings(RecordedDesign design) {
     std::fill(design.recovery.begin(), design.recovery.end(), std::uint16_t{0});
     design.max_gap = 0;
   }
+  design.rest.error = 0;
+  design.rest.samples = 0;
   design.law_gains.clear();
   design.options.settings_name = {};
   return design;

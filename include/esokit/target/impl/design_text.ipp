@@ -166,6 +166,7 @@ ESOKIT_FUNCTION std::string structure_text(const RecordedDesign& d) {
   part(!d.map.lines.empty(), "map");
   part(d.measured.on, "measured");
   part(d.guard.on, "guarded");
+  part(d.rest.on, "rests");
   part(d.loop.divider > 1, "every " + std::to_string(d.loop.divider) + " samples");
   return text;
 }

@@ -153,6 +153,11 @@ ESOKIT_FUNCTION bool FixedRecord::checks() {
   if (design_->predictive) {
     return refuse("controller", 0, "is PredictiveAdrc, which is not written in fixed point");
   }
+  if (design_->rest.on) {
+    return refuse("controller", design_->rest.error,
+                  "is in Resting, which is not written in fixed point: keep u yourself while y "
+                  "is near the reference");
+  }
   if (design_->wrap.period > 0) {
     return refuse("observer", design_->wrap.period,
                   "is in WrappedOutput: in fixed point take the observer without it, and "

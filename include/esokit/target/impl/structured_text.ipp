@@ -180,9 +180,10 @@ class DesignBlock {
       block_.output("u : $real", "to be held until the next sample");
       block_.output("start_status : UINT");
       block_.output("report_status : UINT");
-      const unsigned holds = design_.predictive ? design_.hold : design_.loop.hold_left;
-      block_.output(std::string("mode : UINT := ") + (holds > 0 ? "1" : "0"),
-                    "0: the law, 1: the start hold, 2: too many measurements are missing");
+      block_.output("mode : UINT := " + std::to_string(design_.mode()),
+                    std::string("0: the law, 1: the start hold, 2: too many measurements are "
+                                "missing") +
+                        (design_.rest.on ? ", 3: it rests, u is held" : ""));
     } else {
       block_.input("u : $real", "what the actuator held since the last sample");
       block_.input("resets : BOOL", "TRUE: restarts at (y, 0, .., 0) instead");

@@ -130,6 +130,11 @@ static real other_output(esokit_state *o)
     return HOLD_INPUT;
   }
 #endif
+#if ESOKIT_RESTS
+  if (o->mode == ESOKIT_REST) {
+    return commanded(o);
+  }
+#endif
 #if ESOKIT_HOLDS_SAFE
   return commanded(o);
 #else
@@ -233,6 +238,9 @@ unsigned esokit_start(esokit_state *o, real y, real u)
 #endif
   up_to_date(o);
   o->mode = ESOKIT_RUNNING;
+#if ESOKIT_RESTS
+  leave_rest(o);
+#endif
   o->elsewhere = 1u;
   return 0u;
 }
@@ -305,12 +313,18 @@ real esokit_update(esokit_state *o, real y, DESIGN_R)
   o->phase = 1u;
 #endif
   take_sample(o, measured, o->u_last);
+#if ESOKIT_RESTS
+  judge_rest(o, was_taken(o, y), y, DESIGN_R_GIVEN);
+#endif
   return put_out(o, DESIGN_R_GIVEN);
 }
 
 real esokit_update_without_measurement(esokit_state *o, DESIGN_R)
 {
   skip_sample(o, o->u_last);
+#if ESOKIT_RESTS
+  judge_rest(o, false, 0.0, DESIGN_R_GIVEN);
+#endif
   return put_out(o, DESIGN_R_GIVEN);
 }
 
@@ -339,6 +353,9 @@ static real hold_sample(esokit_state *o, real measured, real u)
     given = commanded(o);
   }
   take_command(o, given);
+#if ESOKIT_RESTS
+  leave_rest(o);
+#endif
 #if ESOKIT_HOLDS_AT_START
   if (o->mode == ESOKIT_START_HOLD) {
     o->mode = ESOKIT_RUNNING;
@@ -516,6 +533,9 @@ bool esokit_load(esokit_state *o, const esokit_saved *from, uint32_t samples, re
   take_command(o, u);
   o->elsewhere = 1u;
 #endif
+#if ESOKIT_RESTS
+  leave_rest(o);
+#endif
   return true;
 }
 
@@ -531,6 +551,7 @@ bool esokit_load(esokit_state *o, const esokit_saved *from, uint32_t samples, re
 #define CALL_SPLITS 6u
 #define CALL_LOSES 7u
 #define CALL_MEASURES 8u
+#define CALL_RESTS 9u
 #define CALL_KINDS 16u
 #define CALL_BAD_Y 16u
 #define CALL_BAD_BESIDE 32u
@@ -567,7 +588,7 @@ static real called(esokit_state *o, unsigned call, const real given[COLUMNS])
   if ((call & CALL_BAD_BESIDE) != 0u) {
     r = r * LARGEST;
   }
-  if (kind == CALL_MISSES) {
+  if ((kind == CALL_MISSES) || (kind == CALL_RESTS)) {
     left = (unsigned)given[0];
   }
 #if ESOKIT_CONTROLLER || ESOKIT_PREDICTIVE
@@ -598,6 +619,13 @@ static real called(esokit_state *o, unsigned call, const real given[COLUMNS])
   } else if (kind == CALL_MISSES) {
     while (left > 0u) {
       result = esokit_update_without_measurement(o, DESIGN_SAMPLE_R);
+      left = left - 1u;
+    }
+#endif
+#if ESOKIT_RESTS
+  } else if (kind == CALL_RESTS) {
+    while (left > 0u) {
+      result = esokit_update(o, r, DESIGN_SAMPLE_R);
       left = left - 1u;
     }
 #endif

@@ -49,6 +49,10 @@ typedef struct {
   uint16_t recovery[ROWS]; /* 0: counts; else 1 more than are due after it */
   uint16_t bridged; /* samples after which each correction is possible */
 #endif
+#if ESOKIT_RESTS
+  real rest_error;
+  uint16_t rest_samples;
+#endif
 } esokit_settings;
 
 extern const esokit_settings esokit_DESIGN_SET;
@@ -59,6 +63,9 @@ extern const esokit_settings esokit_DESIGN_SET;
 #define ESOKIT_RUNNING 0u
 #define ESOKIT_START_HOLD 1u
 #define ESOKIT_SAFE 2u /* too many measurements are missing */
+#if ESOKIT_RESTS
+#define ESOKIT_REST 3u /* y is near the reference: u is held */
+#endif
 
 #endif
 #if ESOKIT_WRAPPED
@@ -150,6 +157,10 @@ typedef struct {
 #endif
 #if ESOKIT_HOLDS_AT_START || ESOKIT_PREDICTIVE
   uint32_t hold_left; /* samples of the start hold */
+#endif
+#if ESOKIT_RESTS
+  real r_before; /* the last finite one */
+  uint32_t inside; /* samples in the band in a row */
 #endif
 #if ESOKIT_RECOVERS
   uint16_t due; /* corrections before the next long gap */
