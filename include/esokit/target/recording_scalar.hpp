@@ -83,6 +83,45 @@ struct OperationList {
     instructions.push_back(given);
     return static_cast<int>(instructions.size()) - 1;
   }
+
+  /// Whether the sign of a result is never minus: not of a zero either. (NaN has none that counts.)
+  [[nodiscard]] bool is_never_negative(int index) const {
+    const Instruction& one = instructions[static_cast<std::size_t>(index)];
+    switch (one.operation) {
+      case Operation::constant:
+        return !std::signbit(one.value);
+      case Operation::magnitude:
+      case Operation::exponential:
+        return true;
+      case Operation::square_root:
+        return is_never_negative(one.a);
+      case Operation::add:
+      case Operation::divide:
+        return is_never_negative(one.a) && is_never_negative(one.b);
+      case Operation::multiply:
+        return one.a == one.b || (is_never_negative(one.a) && is_never_negative(one.b));
+      case Operation::choose:
+        return is_never_negative(one.b) && is_never_negative(one.c);
+      default:
+        return false;
+    }
+  }
+
+  /// Whether a result is never the zero with a minus: adding zero leaves it bit for bit.
+  [[nodiscard]] bool is_never_minus_zero(int index) const {
+    const Instruction& one = instructions[static_cast<std::size_t>(index)];
+    if (is_never_negative(index)) return true;
+    switch (one.operation) {
+      case Operation::add:  // both would have to be
+        return is_never_minus_zero(one.a) || is_never_minus_zero(one.b);
+      case Operation::subtract:
+        return is_never_minus_zero(one.a);
+      case Operation::choose:
+        return is_never_minus_zero(one.b) && is_never_minus_zero(one.c);
+      default:
+        return false;
+    }
+  }
 };
 
 namespace detail {
@@ -221,11 +260,14 @@ class RecordingScalar {
   /// abs(x), noted.
   [[nodiscard]] Self magnitude() const { return with(Operation::magnitude, std::fabs(value_)); }
 
-  /// Noted. @{
+  /// Noted, but for a zero that changes nothing. @{
   friend Self operator+(const Self& a, const Self& b) {
+    if (b.adds_nothing_to(a)) return a;
+    if (a.adds_nothing_to(b)) return b;
     return a.with(Operation::add, b, a.value_ + b.value_);
   }
   friend Self operator-(const Self& a, const Self& b) {
+    if (b.is_constant() && (-b).adds_nothing_to(a)) return a;
     return a.with(Operation::subtract, b, a.value_ - b.value_);
   }
   friend Self operator*(const Self& a, const Self& b) {
@@ -283,6 +325,14 @@ class RecordingScalar {
   /// @}
 
  private:
+  /// Whether it is a zero, and a noted `other` plus it has the bits of `other`.
+  [[nodiscard]] bool adds_nothing_to(const Self& other) const {
+    if (!is_constant() || other.is_constant() || value_ < V(0) || value_ > V(0) ||
+        std::isnan(value_)) {
+      return false;
+    }
+    return std::signbit(value_) || other.noted_.list->is_never_minus_zero(other.noted_.index);
+  }
   [[nodiscard, gnu::__noinline__]] static Self chosen(const RecordedCondition& condition,
                                                       const Self& a, const Self& b) {
     Self chosen = condition.holds() ? a : b;

@@ -61,7 +61,7 @@ typedef double real;
 #define DESIGN_K gains_of[row][0], gains_of[row][1], gains_of[row][2]
 #define DESIGN_ESTIMATES \
   if (row == 0u) { \
-    (void)estimate_0(o, &x); \
+    x = estimate_0(o); \
   }
 #define DESIGN_PUBLISHED \
   if (row == 0u) { \
@@ -183,45 +183,45 @@ typedef double real;
   bool correct_by(esokit_state *o, real y, real k1, real k2, real k3); \
   bool correct_step(esokit_state *o, real y); \
   bool correct_long(esokit_state *o, real y, real contraction, real samples); \
-  bool estimate_0(const esokit_state *o, real *u_out); \
+  real estimate_0(const esokit_state *o); \
   bool shift(esokit_state *o, real offset); \
   bool load(esokit_state *o, real offset); \
   bool is_inlier(const esokit_state *o, real y); \
-  bool drive(const esokit_state *o, real u, real *u_out); \
-  bool limit(esokit_state *o, real u, real *u_out); \
-  bool take_over(esokit_state *o, real u); \
-  bool within(const esokit_state *o, real u, real *u_out); \
-  bool harden(esokit_state *o); \
-  bool soften(esokit_state *o, real u); \
-  bool law_for(const esokit_state *o, DESIGN_R, real e0, real e1, real e2, real *u_out); \
-  DESIGN_LAW bool scaled_bound(const esokit_state *o, real bound, real *u_out); \
+  real drive(const esokit_state *o, real u); \
+  real limit(esokit_state *o, real u); \
+  void take_over(esokit_state *o, real u); \
+  real within(const esokit_state *o, real u); \
+  void harden(esokit_state *o); \
+  void soften(esokit_state *o, real u); \
+  real law_for(const esokit_state *o, DESIGN_R, real e0, real e1, real e2); \
+  DESIGN_LAW real scaled_bound(const esokit_state *o, real bound); \
   bool scale_found(esokit_state *o, real change); \
-  bool predicted_y(const esokit_state *o, real x1, real x2, real x3, real u, real *u_out); \
-  bool stand_at(esokit_state *o, real y, real d1, real d2); \
-  bool schedule_restart(esokit_state *o); \
-  bool schedule_next(esokit_state *o); \
+  real predicted_y(const esokit_state *o, real x1, real x2, real x3, real u); \
+  void stand_at(esokit_state *o, real y, real d1, real d2); \
+  void schedule_restart(esokit_state *o); \
+  void schedule_next(esokit_state *o); \
   bool schedule_settle(esokit_state *o); \
-  bool anchor_begin(esokit_state *o); \
-  bool anchor_take(esokit_state *o, real power, real contraction); \
-  bool anchor_contraction(const esokit_state *o, real power, real contraction, real *u_out); \
-  bool anchor_power(const esokit_state *o, real power, real contraction, real *u_out); \
-  bool anchor_end(esokit_state *o, real count); \
-  bool present_poles(const esokit_state *o, real *u_out); \
-  bool joined_poles(const esokit_state *o, real a, real b, real *u_out); \
-  bool filter_corrected(esokit_state *o); \
-  bool filter_missed(esokit_state *o); \
+  void anchor_begin(esokit_state *o); \
+  void anchor_take(esokit_state *o, real power, real contraction); \
+  real anchor_contraction(const esokit_state *o, real power, real contraction); \
+  real anchor_power(const esokit_state *o, real power, real contraction); \
+  void anchor_end(esokit_state *o, real count); \
+  real present_poles(const esokit_state *o); \
+  real joined_poles(const esokit_state *o, real a, real b); \
+  void filter_corrected(esokit_state *o); \
+  void filter_missed(esokit_state *o); \
   bool filter_at_ceiling(esokit_state *o); \
   bool filter_to_limit(esokit_state *o); \
-  bool control_by(esokit_state *o, real y, real *u_out); \
-  bool control_blind(esokit_state *o, real *u_out); \
-  bool refer(esokit_state *o, DESIGN_R); \
-  bool take_output(esokit_state *o, real u); \
-  bool track(esokit_state *o); \
-  bool settle(esokit_state *o); \
+  real control_by(esokit_state *o, real y); \
+  real control_blind(esokit_state *o); \
+  void refer(esokit_state *o, DESIGN_R); \
+  void take_output(esokit_state *o, real u); \
+  void track(esokit_state *o); \
+  void settle(esokit_state *o); \
   bool revise(esokit_state *o, real u); \
   bool arm_restart(esokit_state *o); \
-  bool arm_at(esokit_state *o, real u, real *u_out); \
-  bool arm_blind(esokit_state *o, real *u_out); \
+  real arm_at(esokit_state *o, real u); \
+  real arm_blind(esokit_state *o); \
   DESIGN_REST DESIGN_PHASES
 #if ESOKIT_WRAPPED
 #define DESIGN_REST bool rest_at(esokit_state *o, real y, real u, real angle);
@@ -231,14 +231,14 @@ typedef double real;
 #if ESOKIT_SCHEDULE
 #define DESIGN_LAW
 #define DESIGN_PHASES \
-  bool arm_blanked(esokit_state *o, real *u_out); \
+  real arm_blanked(esokit_state *o); \
   bool arm_by(esokit_state *o); \
   bool arm_long(esokit_state *o, real contraction, real samples);
 #elif ESOKIT_FILTER
-#define DESIGN_LAW bool law(const esokit_state *o, DESIGN_R, real *u_out);
+#define DESIGN_LAW real law(const esokit_state *o, DESIGN_R);
 #define DESIGN_PHASES bool arm_by(esokit_state *o);
 #else
-#define DESIGN_LAW bool law(const esokit_state *o, DESIGN_R, real *u_out);
+#define DESIGN_LAW real law(const esokit_state *o, DESIGN_R);
 #define DESIGN_PHASES bool arm_by(esokit_state *o, real k1, real k2, real k3);
 #endif
 

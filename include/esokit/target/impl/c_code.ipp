@@ -20,15 +20,16 @@
 
 namespace esokit::detail {
 
-/// `static bool name(state *o, arguments, *u)`: true, or false if a check does not hold; then
-/// nothing has changed.
+/// A recorded call as a function of C: `static real name(state *o, arguments)` if it gives a
+/// number, `static bool` if its shell asks whether a check holds, else `static void`. If a check
+/// does not hold, nothing has changed.
 inline std::string c_function(const ListWriter& writer, const std::string& prefix,
-                              const NamedCall& names, const RecordedCall& call) {
+                              const NamedCall& names, const RecordedCall& call, bool is_asked) {
   const WrittenCall lines = writer.written(names, call);
-  std::string text = "static bool " + names.name + "(" + (lines.results.empty() ? "const " : "") +
-                     prefix + "_state *o";
+  const std::string type = names.has_output ? writer.real() : is_asked ? "bool" : "void";
+  std::string text = "static " + type + " " + names.name + "(" +
+                     (lines.results.empty() ? "const " : "") + prefix + "_state *o";
   for (const auto& argument : names.arguments) text += ", " + writer.real() + " " + argument;
-  if (names.has_output) text += ", " + writer.real() + " *u_out";
   text += ")\n{\n";
   for (const auto* part : {&lines.reads, &lines.lines}) {
     for (const auto& line : *part) {
@@ -37,14 +38,16 @@ inline std::string c_function(const ListWriter& writer, const std::string& prefi
     }
   }
   for (const auto& argument : lines.unused) text += "  (void)" + argument + ";\n";
-  for (const auto& check : lines.checks)
-    text += "  if (!" + check + ") {\n    return false;\n  }\n";
+  for (const auto& check : lines.checks) {
+    text += "  if (!" + check + ") {\n    return" + (type == "bool" ? " false" : "") + ";\n  }\n";
+  }
   for (const auto& [member, value] : lines.results) {
     text += "  o->" + member + " = " + value + ";\n";
   }
   if (lines.results.empty() && lines.reads.empty()) text += "  (void)o;\n";
-  if (names.has_output) text += "  *u_out = " + lines.output + ";\n";
-  return text + "  return true;\n}\n\n";
+  if (names.has_output) text += "  return " + lines.output + ";\n";
+  if (type == "bool") text += "  return true;\n";
+  return text + "}\n\n";
 }
 
 /// What is known is computed by functions of the C library, whose last bits are its own.
@@ -107,7 +110,8 @@ class CDesign {
     for (std::size_t i = 0; i < design_.names.size(); ++i) {
       const NamedCall& names = design_.names[i];
       if (!RuntimeText::uses(shell, names.name + "(o")) continue;
-      lists += c_function(writer_, design_.options.name, names, design_.calls[i]);
+      const bool stands_alone = shell.find("  " + names.name + "(o") != std::string::npos;
+      lists += c_function(writer_, design_.options.name, names, design_.calls[i], !stands_alone);
     }
     text_.lines("DESIGN_LISTS", lists);
     return text_.source(runtime::source);
@@ -276,7 +280,7 @@ class CDesign {
       });
     };
     text_.lines("DESIGN_ESTIMATES", by_row("  ", [](const std::string& row) {
-                  return "(void)estimate_" + row + "(o, &x);";
+                  return "x = estimate_" + row + "(o);";
                 }));
     text_.lines("DESIGN_PUBLISHED", by_row("    ", [](const std::string& row) {
                   return "x = o->published_" + row + ";";
@@ -367,10 +371,9 @@ class CDesign {
   }
   void set_turns(const std::string& of, const TurnNumbers& turns) {
     set(of, {{"angle", turns.y}, {"turns", turns.turns}, {"motion", turns.motion}},
-        {{"motion_samples", turns.samples},
-         {"gaps", turns.gaps},
-         {"doubts", turns.doubts},
-         {"begun", turns.begun}});
+        {{"gaps", turns.gaps}, {"doubts", turns.doubts}, {"begun", turns.begun}});
+    set(of + "motion_samples",
+        turns.samples == 65535 ? "COUNT_MOST" : std::to_string(turns.samples) + "u");
   }
   void set_found(const GuardNumbers& guard) {
     set("",

@@ -2,6 +2,14 @@
 R"esokit("
 #endif
 #if ESOKIT_WRAPPED
+#define DOUBTS_MOST 3u /* measurements that do not fit, after which the next is believed */
+#define LONGER_MOST 8u /* gaps longer than that of the motion, after which it is not known */
+#define MOTION_SHARE 0.125 /* of a step in the motion */
+#if ESOKIT_GATED_ANGLE
+#define STEADY_LEAST 8u /* measurements that fit, after which rejected ones count turns */
+#define SEEN_MOST 255u
+#endif
+
 /* A measured angle. */
 typedef struct {
   real y; /* within half a period of zero */
@@ -33,7 +41,7 @@ static void forget_count(esokit_turns *o)
   o->angle = 0.0;
   o->turns = 0.0;
   o->motion = 0.0;
-  o->motion_samples = 65535u;
+  o->motion_samples = COUNT_MOST;
   o->gaps = 0u;
   o->doubts = 0u;
   o->begun = 0u;
@@ -73,7 +81,7 @@ static unsigned restart_at_angle(esokit_state *o, real y)
 static real expected_motion(const esokit_turns *o, uint32_t samples)
 {
   real motion = o->motion;
-  if ((o->motion_samples == 65535u) || (samples == 0u)) {
+  if ((o->motion_samples == COUNT_MOST) || (samples == 0u)) {
     motion = 0.0;
   } else if (samples != o->motion_samples) {
     motion = o->motion * ((real)samples / (real)o->motion_samples);
@@ -109,13 +117,13 @@ static angle_reading read_angle(const esokit_turns *o, real y, uint32_t samples)
     const real crossed = (fabs(ahead) <= HALF_PERIOD) ? 0.0 : round(ahead * PER_PERIOD);
     const real motion = change + (crossed * PERIOD);
     reading.step = wrapped(change);
-    if (o->motion_samples != 65535u) {
+    if (o->motion_samples != COUNT_MOST) {
       reading.fits = (fabs(motion - expected) <= QUARTER_PERIOD) &&
         ((samples > o->motion_samples) || (fabs(motion) <= HALF_PERIOD));
     }
     reading.turns = o->turns + crossed;
     reading.counted =
-      (reading.fits || (o->doubts >= 3u)) && is_finite(reading.turns * PERIOD);
+      (reading.fits || (o->doubts >= DOUBTS_MOST)) && is_finite(reading.turns * PERIOD);
   }
   return reading;
 }
@@ -123,8 +131,7 @@ static angle_reading read_angle(const esokit_turns *o, real y, uint32_t samples)
 /* Keeps the estimate within half a period of zero. */
 static void recentre(esokit_state *o)
 {
-  real z = 0.0;
-  (void)estimate_0(o, &z);
+  const real z = estimate_0(o);
   if (!(fabs(z) <= HALF_PERIOD)) {
     const real turns = round(z * PER_PERIOD);
     if (shift(o, -(turns * PERIOD))) {
@@ -141,16 +148,16 @@ static void learn_motion(esokit_turns *o, const angle_reading *reading)
   if ((o->begun != 0u) && (reading->samples != 0u)) {
     if (reading->samples > o->motion_samples) {
       o->gaps = (uint8_t)(o->gaps + 1u);
-      if (o->gaps >= 8u) {
-        o->motion_samples = 65535u; /* after so many gaps it is not known */
+      if (o->gaps >= LONGER_MOST) {
+        o->motion_samples = COUNT_MOST; /* after so many gaps it is not known */
       }
     } else {
       o->gaps = 0u;
-      if ((reading->samples < o->motion_samples) || (o->doubts >= 3u)) {
+      if ((reading->samples < o->motion_samples) || (o->doubts >= DOUBTS_MOST)) {
         o->motion = reading->step;
         o->motion_samples = (uint16_t)reading->samples;
       } else if (reading->fits) {
-        o->motion = o->motion + ((reading->step - o->motion) * 0.125);
+        o->motion = o->motion + ((reading->step - o->motion) * MOTION_SHARE);
       } else {
         /* It says nothing. */
       }
@@ -165,7 +172,7 @@ static void learn_turn(esokit_turns *o, const angle_reading *reading)
   o->turns = reading->turns;
   if (reading->fits) {
     o->doubts = 0u;
-  } else if (o->doubts < 3u) {
+  } else if (o->doubts < DOUBTS_MOST) {
     o->doubts = (uint8_t)(o->doubts + 1u);
   } else {
     /* There are enough. */
@@ -179,7 +186,7 @@ static angle_reading choose_angle(const esokit_state *o, real y, uint32_t missed
   angle_reading reading = read_angle(&o->taken, y, missed);
 #if ESOKIT_GATED_ANGLE
   reading.missed = missed;
-  if ((o->seen_rejected > 0u) && (o->seen_steady >= 8u) &&
+  if ((o->seen_rejected > 0u) && (o->seen_steady >= STEADY_LEAST) &&
       (o->seen_steady >= o->seen_rejected)) {
     angle_reading seen = read_angle(&o->seen, y, missed - o->seen_at);
     if (seen.fits && seen.counted) {
@@ -195,13 +202,13 @@ static angle_reading choose_angle(const esokit_state *o, real y, uint32_t missed
 #if ESOKIT_GATED_ANGLE
 static uint8_t one_more(uint8_t count)
 {
-  return (count < 255u) ? (uint8_t)(count + 1u) : count;
+  return (count < SEEN_MOST) ? (uint8_t)(count + 1u) : count;
 }
 
 static void hear_angle(esokit_state *o, const angle_reading *given)
 {
   const angle_reading reading = read_angle(&o->seen, given->y, given->missed - o->seen_at);
-  const bool steady = reading.fits && (o->seen.motion_samples != 65535u);
+  const bool steady = reading.fits && (o->seen.motion_samples != COUNT_MOST);
   o->seen_steady = steady ? one_more(o->seen_steady) : 0u;
   o->seen_rejected = one_more(o->seen_rejected);
   o->seen_at = (uint16_t)given->missed;

@@ -46,14 +46,12 @@ static real within(const esokit_state *o, real change, real place)
 /* Loses no small change. */
 static void move(esokit_state *o, real change)
 {
-  real sum;
-  real taken;
   o->rest = o->rest + change;
   if (fabs(o->rest) <= (DIGITS * fabs(o->whole))) {
     return;
   }
-  sum = o->whole + o->rest;
-  taken = sum - o->whole;
+  const real sum = o->whole + o->rest;
+  const real taken = sum - o->whole;
   o->rest = (o->whole - (sum - taken)) + (o->rest - taken);
   o->whole = sum;
 }
@@ -114,14 +112,11 @@ bool esokit_update(esokit_state *o, real target)
   const bool good = fits(target);
   const real place = o->whole + o->rest;
   real now[COUNT];
-  real change;
-  real speed;
-  real needed;
   if (good) {
     o->target = target;
   }
-  change = within(o, BY_BANDWIDTH * ((o->whole - o->target) + o->rest), place);
-  speed = change / SAMPLE_TIME;
+  const real change = within(o, BY_BANDWIDTH * ((o->whole - o->target) + o->rest), place);
+  const real speed = change / SAMPLE_TIME;
 #if ESOKIT_LAGS
   now[0] = place - o->behind;
   now[1] = o->behind / LAG;
@@ -134,9 +129,12 @@ bool esokit_update(esokit_state *o, real target)
   move(o, change);
   delay(o, now);
   /* u is held for a sample: it needs what the middle of it does. */
-  needed = (POLE * ((place - o->begin) + (change / 2.0))) + (now[1] - o->motion[1]);
+  const real carried = POLE * ((place - o->begin) + (change / 2.0));
 #if ESOKIT_LAGS
-  needed = needed + (LAG * (now[2] - o->motion[2]));
+  const real needed =
+    (carried + (now[1] - o->motion[1])) + (LAG * (now[2] - o->motion[2]));
+#else
+  const real needed = carried + (now[1] - o->motion[1]);
 #endif
   o->feed = needed / INPUT_GAIN;
   return good;

@@ -61,17 +61,17 @@ static real finite_input_for(real effect)
 /* The last u of update, or what was commanded elsewhere since. */
 static real commanded(const esokit_state *o)
 {
-  real u = o->u_kept;
 #if ESOKIT_GUARDED || ESOKIT_MONITORED || ESOKIT_SETTINGS
-  (void)within(o, u, &u); /* else put_out sees to it */
+  return within(o, o->u_kept); /* else put_out sees to it */
+#else
+  return o->u_kept;
 #endif
-  return u;
 }
 
 /* u is commanded elsewhere. */
 static void take_command(esokit_state *o, real u)
 {
-  (void)take_over(o, u);
+  take_over(o, u);
   o->u_kept = u;
 }
 
@@ -92,19 +92,19 @@ static real wanted(esokit_state *o, DESIGN_R)
 {
   real u = 0.0;
 #if ESOKIT_LAW_OF_ANGLE
-  (void)law(o, wrapped(r - o->DESIGN_ANGLE), &u);
+  u = law(o, wrapped(r - o->DESIGN_ANGLE));
 #elif ESOKIT_WRAPPED && !ESOKIT_ERROR_BASED && !ESOKIT_COMPENSATOR
   const real angle = estimate_at(o, 0u);
 #if ESOKIT_MOVES
-  (void)law(o, angle + wrapped(r - angle), DESIGN_MOTION, &u);
+  u = law(o, angle + wrapped(r - angle), DESIGN_MOTION);
 #else
-  (void)law(o, angle + wrapped(r - angle), &u);
+  u = law(o, angle + wrapped(r - angle));
 #endif
 #elif ESOKIT_GUARDED && ESOKIT_COMPENSATOR
-  (void)law(o, -0.0, &u);
+  u = law(o, -0.0);
   u = r + (u * o->input_factor);
 #else
-  (void)law(o, DESIGN_R_GIVEN, &u);
+  u = law(o, DESIGN_R_GIVEN);
 #endif
 #if ESOKIT_GUARDED && !ESOKIT_SOFTENS && !ESOKIT_COMPENSATOR
   u = u * o->input_factor;
@@ -113,7 +113,7 @@ static real wanted(esokit_state *o, DESIGN_R)
   u = esokit_input_for(u);
 #endif
 #if ESOKIT_SOFTENS
-  (void)soften(o, u);
+  soften(o, u);
 #endif
   return u;
 }
@@ -146,10 +146,9 @@ static real other_output(esokit_state *o)
 /* After the observer's part of a sample. */
 static real put_out(esokit_state *o, DESIGN_R)
 {
-  bool runs;
   real u = r; /* which has to be finite where it is not used, too */
   judge_missing(o);
-  runs = o->mode == ESOKIT_RUNNING;
+  const bool runs = o->mode == ESOKIT_RUNNING;
 #if ESOKIT_ERROR_BASED || ESOKIT_MOVES
   if (!(DESIGN_R_IS_FINITE)) {
     o->status = (uint16_t)(o->status | ESOKIT_REFERENCE_REJECTED);
@@ -165,7 +164,7 @@ static real put_out(esokit_state *o, DESIGN_R)
   if (!runs) {
     u = other_output(o);
   }
-  (void)limit(o, u, &u);
+  u = limit(o, u);
   o->u_kept = u;
   o->elsewhere = 0u;
   return u;
@@ -231,7 +230,7 @@ unsigned esokit_start(esokit_state *o, real y, real u)
   }
   take_command(o, u);
 #if ESOKIT_SOFTENS
-  (void)harden(o);
+  harden(o);
 #endif
 #if ESOKIT_GATED
   gate_set(o, true);
@@ -274,8 +273,10 @@ static void take_sample(esokit_state *o, real measured, real given)
 {
 #if ESOKIT_DIVIDED
   const bool planned = (o->gap + 1u) == DIVIDER;
-#endif
   unsigned status = observe_update(o, measured, given);
+#else
+  const unsigned status = observe_update(o, measured, given);
+#endif
   if ((status & ESOKIT_RESTARTED) != 0u) {
     rest_again(o, measured);
   }
@@ -347,7 +348,7 @@ static real hold_sample(esokit_state *o, real measured, real u)
   const bool good = is_finite(u);
   real given = u;
 #if ESOKIT_SOFTENS
-  (void)harden(o);
+  harden(o);
 #endif
   if (!good) {
     given = commanded(o);
@@ -475,16 +476,21 @@ real esokit_estimate(const esokit_state *o, unsigned row)
 #if ESOKIT_SAVED
 /* ---- A state that is kept over a restart. */
 
+/* CRC-32 of IEEE 802.3, from the lowest bit on. */
+#define CRC_POLYNOMIAL 0xedb88320u
+#define CRC_BEGIN 0xffffffffu
+#define CRC_BITS 8u /* of a byte */
+
 static uint32_t crc_of(const esokit_state *o)
 {
   const uint8_t *const bytes = (const uint8_t *)o;
-  uint32_t crc = 0xffffffffu;
+  uint32_t crc = CRC_BEGIN;
   uint32_t i;
   for (i = 0u; i < (uint32_t)sizeof *o; ++i) {
     unsigned bit;
     crc = crc ^ bytes[i];
-    for (bit = 0u; bit < 8u; ++bit) {
-      crc = (crc >> 1) ^ (((crc & 1u) != 0u) ? 0xedb88320u : 0u);
+    for (bit = 0u; bit < CRC_BITS; ++bit) {
+      crc = (crc >> 1) ^ (((crc & 1u) != 0u) ? CRC_POLYNOMIAL : 0u);
     }
   }
   return ~crc;
@@ -510,7 +516,7 @@ static void pass_sample(esokit_state *o, real u)
 
 bool esokit_load(esokit_state *o, const esokit_saved *from, uint32_t samples, real u)
 {
-  const uint32_t count = (samples < UINT16_MAX) ? samples : UINT16_MAX; /* no more are counted */
+  const uint32_t count = (samples < COUNT_MOST) ? samples : COUNT_MOST; /* no more are counted */
   uint32_t i;
 #if ESOKIT_SETTINGS
   const esokit_settings *const settings = o->settings;

@@ -171,7 +171,7 @@ typedef struct {
   uint8_t mode;
 #endif
 #if ESOKIT_PREDICTIVE
-  uint8_t phase; /* 1: y was given, 2: it is missing, 3 and 4: and u, 5: started */
+  uint8_t phase; /* see PHASE_ in the source */
 #endif
 #if ESOKIT_CONTROLLER
   uint8_t elsewhere; /* u was commanded by something else since the last sample */

@@ -4,14 +4,11 @@ R"esokit("
 /* The observer without what is around y and u. */
 static unsigned predict_core(esokit_state *o, real u)
 {
-#if ESOKIT_MEASURED
-  unsigned status;
-#endif
 #if ESOKIT_SCHEDULE || ESOKIT_FILTER
   law_advance(o);
 #endif
 #if ESOKIT_MEASURED
-  status = predict_plain(o, u);
+  const unsigned status = predict_plain(o, u);
   advance_measured(o);
   return status;
 #else
@@ -34,9 +31,8 @@ static unsigned correct_core(esokit_state *o, real y)
 #if !ESOKIT_PREDICTIVE
 static unsigned update_core(esokit_state *o, real y, real u)
 {
-  unsigned status;
 #if ESOKIT_GATED || ESOKIT_WATCHED || ESOKIT_MEASURED
-  status = predict_core(o, u);
+  const unsigned status = predict_core(o, u);
   return status | correct_core(o, y);
 #else
   bool done = false;
@@ -56,7 +52,7 @@ static unsigned update_core(esokit_state *o, real y, real u)
 #endif
     return 0u;
   }
-  status = predict_plain(o, u);
+  const unsigned status = predict_plain(o, u);
   return status | correct_plain(o, y);
 #endif
 }
@@ -98,7 +94,7 @@ static unsigned take_input(esokit_state *o, real *u)
   if (!is_finite(*u)) {
     status = status | ESOKIT_INPUT_REJECTED;
   }
-  (void)drive(o, *u, u); /* the known part of the motion acts like a u of its own */
+  *u = drive(o, *u); /* the known part of the motion acts like a u of its own */
 #endif
   return status;
 }

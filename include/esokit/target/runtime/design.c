@@ -73,9 +73,9 @@ static real estimate_at(const esokit_state *o, unsigned row)
 }
 
 #if ESOKIT_CONTROLLER && ESOKIT_SCHEDULE
-static bool law(const esokit_state *o, DESIGN_R, real *u)
+static real law(const esokit_state *o, DESIGN_R)
 {
-  return law_for(o, DESIGN_R_GIVEN, DESIGN_ALL_ESTIMATES, u);
+  return law_for(o, DESIGN_R_GIVEN, DESIGN_ALL_ESTIMATES);
 }
 
 #endif
@@ -98,14 +98,12 @@ static void get_state(const esokit_state *o, real x[STATES])
 
 static real predicted_from(const esokit_state *o, const real x[STATES], real u)
 {
-  real y = 0.0;
-  (void)predicted_y(o, DESIGN_X, u, &y);
-  return y;
+  return predicted_y(o, DESIGN_X, u);
 }
 
 static void stand(esokit_state *o, real y, const real d[LEVELS])
 {
-  (void)stand_at(o, y, DESIGN_D);
+  stand_at(o, y, DESIGN_D);
 }
 
 #endif

@@ -43,7 +43,7 @@ DESIGN_LISTS
 
 static int32_t within(int64_t x, int32_t most, unsigned *status)
 {
-  int32_t held = (int32_t)most;
+  int32_t held = most;
   if (x > most) {
     *status |= ESOKIT_SATURATED;
   } else if (x < -(int64_t)most) {
@@ -263,8 +263,10 @@ ESOKIT_APART static int32_t put_out_held(esokit_state *o)
 
 static int32_t put_out(esokit_state *o, y_count reference)
 {
+#if ESOKIT_COUNTER
+  const int32_t r = counts(o, reference);
+#else
   int32_t r = counts(o, reference);
-#if !ESOKIT_COUNTER
   if (r > Y_MOST) {
     r = Y_MOST;
     o->status = (uint8_t)(o->status | ESOKIT_REFERENCE_REJECTED);
@@ -290,7 +292,6 @@ ESOKIT_APART static int32_t update_guarded(esokit_state *o, y_count y, y_count r
 
 unsigned esokit_start(esokit_state *o, y_count given, int32_t u)
 {
-  unsigned status;
 #if !ESOKIT_COUNTER
   if (((uint32_t)given + Y_MOST_U) > Y_TWICE) {
     return ESOKIT_MEASUREMENT_REJECTED;
@@ -300,9 +301,9 @@ unsigned esokit_start(esokit_state *o, y_count given, int32_t u)
     return ESOKIT_INPUT_REJECTED;
   }
 #if ESOKIT_COUNTER
-  status = rest_at(o, 0, u);
+  const unsigned status = rest_at(o, 0, u);
 #else
-  status = rest_at(o, given, u);
+  const unsigned status = rest_at(o, given, u);
 #endif
 #if ESOKIT_COUNTER
   o->y_last = given;
@@ -394,7 +395,7 @@ unsigned esokit_adopt(esokit_state *o, const esokit_settings *settings)
   unsigned status = ESOKIT_SETTINGS_REJECTED;
   unsigned i;
   if (settings->design == DESIGN_MARK) {
-    const int32_t *most = (o->gap > 0u) ? settings->reach : settings->box;
+    const int32_t *const most = (o->gap > 0u) ? settings->reach : settings->box;
     status = 0u;
     o->settings = settings;
     for (i = 0u; i < STATES; ++i) {

@@ -13,7 +13,7 @@ static void keep_bound(esokit_state *o)
 #if ESOKIT_BOUND_OF_U
   const real bound = BOUND_OF_U * fabs(INPUT_GAIN * o->gain_ratio);
   if ((bound > 0.0) && is_finite(bound)) {
-    (void)scaled_bound(o, bound, &most);
+    most = scaled_bound(o, bound);
     if (!is_finite(most)) {
       most = LARGEST;
     }
@@ -108,13 +108,11 @@ static unsigned predict_standing(esokit_state *o, real u)
 {
   real x[STATES];
   real d[LEVELS];
-  real expected = 0.0;
-  unsigned status;
   get_state(o, x);
-  status = predict_outside(o, u * o->given_ratio);
+  const unsigned status = predict_outside(o, u * o->given_ratio);
   if ((status & ESOKIT_PREDICTION_DROPPED) == 0u) {
+    const real expected = predicted_from(o, x, o->u_applied);
     unsigned i;
-    expected = predicted_from(o, x, o->u_applied);
     for (i = 1u; i < ORDER; ++i) {
       const real state = x[i];
       if ((state < 0.0) || (state > 0.0)) {
@@ -134,12 +132,11 @@ static unsigned correct_standing(esokit_state *o, real y)
   const bool overdue = is_overdue(o);
   const unsigned elapsed = (o->gap > 1u) ? o->gap : 1u;
   real left = 1.0;
-  unsigned status;
   if (!overdue) {
     left = 1.0 - gains_of[elapsed - 1u][0];
   }
   get_disturbance(o, before);
-  status = correct_outside(o, y);
+  const unsigned status = correct_outside(o, y);
   if (!refused(status)) {
     settle_guards(o, SETTLING);
     stand(o, o->DESIGN_Y + (left * o->innovation), before);
@@ -151,11 +148,10 @@ static unsigned correct_standing(esokit_state *o, real y)
 
 static unsigned predict_guarded(esokit_state *o, real u)
 {
-  unsigned status;
   if (o->held != 0u) {
     return predict_standing(o, u);
   }
-  status = predict_outside(o, u * o->given_ratio);
+  const unsigned status = predict_outside(o, u * o->given_ratio);
   o->given_ratio = o->gain_ratio;
   return status;
 }
@@ -163,12 +159,11 @@ static unsigned predict_guarded(esokit_state *o, real u)
 static unsigned correct_guarded(esokit_state *o, real y)
 {
   real before[LEVELS];
-  unsigned status;
   if ((o->held != 0u) || (o->unsettled != 0u)) {
     return correct_standing(o, y);
   }
   get_disturbance(o, before);
-  status = correct_outside(o, y);
+  const unsigned status = correct_outside(o, y);
   keep_guards(o, before, status);
   return status;
 }
@@ -176,13 +171,12 @@ static unsigned correct_guarded(esokit_state *o, real y)
 static unsigned update_guarded(esokit_state *o, real y, real u)
 {
   real before[LEVELS];
-  unsigned status;
   if ((o->held != 0u) || (o->unsettled != 0u)) {
-    status = predict_guarded(o, u);
-    return status | correct_guarded(o, y);
+    const unsigned predicted = predict_guarded(o, u);
+    return predicted | correct_guarded(o, y);
   }
   get_disturbance(o, before);
-  status = update_outside(o, y, u * o->given_ratio);
+  const unsigned status = update_outside(o, y, u * o->given_ratio);
   o->given_ratio = o->gain_ratio;
   keep_guards(o, before, status);
   return status;
@@ -211,7 +205,7 @@ unsigned esokit_set_pin(esokit_state *o, uint8_t where)
   }
   if (where == ESOKIT_PIN_EITHER) {
     const real u = applied_by_present(o);
-    o->side = (u > 0.0) ? 1u : ((u < 0.0) ? 2u : 0u);
+    o->side = (u > 0.0) ? ESOKIT_PIN_UPPER : ((u < 0.0) ? ESOKIT_PIN_LOWER : ESOKIT_PIN_FREE);
   } else if (where != ESOKIT_PIN_FREE) {
     o->side = where;
   } else {
@@ -232,10 +226,9 @@ unsigned esokit_set_pin(esokit_state *o, uint8_t where)
 /* Tells that the plant is held; the u under which it would stand still. */
 static real hold_guards(esokit_state *o)
 {
-  real u;
   o->held = 1u;
   set_weights(o);
-  u = (-estimate_at(o, ORDER)) * (PER_INPUT_GAIN * o->input_factor);
+  const real u = (-estimate_at(o, ORDER)) * (PER_INPUT_GAIN * o->input_factor);
   return is_finite(u) ? u : applied_by_present(o);
 }
 

@@ -1,6 +1,11 @@
 #ifdef __cplusplus
 R"esokit("
 #endif
+#define COUNT_MOST 4294967295u /* of what is counted: more is as much */
+/* Flags of the status of the controller. */
+#define REJECTED 65u /* y: MEASUREMENT_REJECTED, OUTLIER_REJECTED */
+#define BRIDGED 24u /* GAP_BRIDGED, RESTARTED */
+
 void esokit_clear(esokit_state *o)
 {
   (void)memset(o, 0, sizeof *o);
@@ -17,7 +22,7 @@ static real nearer(real share, real now, real weight)
 static uint32_t counted(uint32_t many, bool now)
 {
   uint32_t next = many;
-  if (now && (many < 4294967295u)) {
+  if (now && (many < COUNT_MOST)) {
     next = many + 1u;
   }
   return next;
@@ -59,7 +64,7 @@ static void count(esokit_state *o, const esokit_sample *sample, bool rejected)
   }
   o->samples = counted(o->samples, true);
   o->rejected = counted(o->rejected, rejected);
-  o->bridged = counted(o->bridged, (sample->status & (8u | 16u)) != 0u);
+  o->bridged = counted(o->bridged, (sample->status & BRIDGED) != 0u);
   o->unsafe = counted(o->unsafe, !sample->runs);
   o->lost = nearer(o->lost, gone, RARE_WEIGHT);
   o->saturated = nearer(o->saturated, fabs(limit), WEIGHT);
@@ -140,7 +145,6 @@ static void oppose(esokit_state *o, real psi)
   const real late = o->slow_phi - MIDDLE;
   real side = 0.0;
   real least = LEAST_AGAINST;
-  real against;
   if ((now > END_OF_RANGE) && (late > END_OF_RANGE)) {
     side = 1.0;
   } else if ((now < -END_OF_RANGE) && (late < -END_OF_RANGE)) {
@@ -148,7 +152,7 @@ static void oppose(esokit_state *o, real psi)
   } else {
     /* Not near. */
   }
-  against = (-side) * (o->phi + psi);
+  const real against = (-side) * (o->phi + psi);
   if (!(against > least)) {
     o->top = 0.0;
   }
@@ -191,15 +195,13 @@ static void regress(esokit_state *o)
   forget(o);
   if ((size > LEAST_SHARE) && (size > LEAST_PHI)) {
     const real a = o->x + o->y;
-    real quotient;
-    real square;
     o->sum_x = o->sum_x + size;
     o->sum_xx = o->sum_xx + (o->x * o->x);
     o->sum_xy = o->sum_xy + (o->x * o->y);
     o->sum_aa = o->sum_aa + (a * a);
     o->evidence = STEP * (o->sum_x * (o->sum_x / o->sum_xx));
-    quotient = o->sum_xy / o->sum_xx;
-    square = o->sum_aa / o->sum_xx;
+    const real quotient = o->sum_xy / o->sum_xx;
+    const real square = o->sum_aa / o->sum_xx;
     if (is_finite(quotient) && is_finite(square)) {
       o->gain_ratio = 1.0 + quotient;
       o->response = sqrt(square);
@@ -242,10 +244,7 @@ static void remember_sign(esokit_state *o)
 
 static void take_sample(esokit_state *o, const esokit_sample *sample)
 {
-  const bool rejected = (sample->status & (1u | 64u)) != 0u;
-  real phi;
-  bool lost;
-  bool is_free;
+  const bool rejected = (sample->status & REJECTED) != 0u;
   count(o, sample, rejected);
   if ((sample->missed == 0u) && !rejected) {
     average(o, sample->innovation);
@@ -258,10 +257,10 @@ static void take_sample(esokit_state *o, const esokit_sample *sample)
     return;
   }
   o->phase = 0u;
-  phi = o->phi_sum / (real)DIVIDER;
+  const real phi = o->phi_sum / (real)DIVIDER;
   o->phi_sum = 0.0;
-  lost = o->is_lost || (sample->missed >= DIVIDER);
-  is_free = o->is_free;
+  const bool lost = o->is_lost || (sample->missed >= DIVIDER);
+  const bool is_free = o->is_free;
   o->is_lost = false;
   o->is_free = true;
   if (!filter(o, phi, sample->disturbance)) {
@@ -281,7 +280,7 @@ static void take_sample(esokit_state *o, const esokit_sample *sample)
 
 void esokit_look(esokit_state *o, const esokit_sample *sample)
 {
-  if ((sample->missed == 0u) && ((sample->status & (1u | 64u)) == 0u) &&
+  if ((sample->missed == 0u) && ((sample->status & REJECTED) == 0u) &&
       is_finite(sample->measured)) {
     watch_sensor(o, sample->measured);
   }

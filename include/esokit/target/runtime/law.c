@@ -4,6 +4,9 @@ R"esokit("
 #if ESOKIT_SCHEDULE
 /* ---- The schedule of the gain. */
 
+#define AGE_MOST 1073741823u
+#define ANCHOR_EVERY 256u /* samples */
+
 static void law_begin(esokit_state *o)
 {
   o->age = 0u;
@@ -22,16 +25,16 @@ static void schedule_anchor(esokit_state *o, uint32_t count)
   real power = DECAY;
   real contraction = SHIFT;
   uint32_t rest = count;
-  (void)anchor_begin(o);
+  anchor_begin(o);
   while (rest != 0u) {
     if ((rest & 1u) != 0u) {
-      (void)anchor_take(o, power, contraction);
+      anchor_take(o, power, contraction);
     }
-    (void)anchor_contraction(o, power, contraction, &contraction);
-    (void)anchor_power(o, power, contraction, &power);
+    contraction = anchor_contraction(o, power, contraction);
+    power = anchor_power(o, power, contraction);
     rest = rest / 2u;
   }
-  (void)anchor_end(o, (real)count);
+  anchor_end(o, (real)count);
 }
 
 static void law_advance(esokit_state *o)
@@ -40,20 +43,20 @@ static void law_advance(esokit_state *o)
     return;
   }
   if ((o->pending != 0u) && ((LAW_START + o->age) <= STATES)) {
-    (void)schedule_restart(o);
+    schedule_restart(o);
     law_begin(o);
   }
   o->pending = 1u;
-  if (o->age < 1073741823u) {
+  if (o->age < AGE_MOST) {
     o->age = o->age + 1u;
   }
   if ((LAW_START + o->age) <= STATES) {
     return; /* the estimate is exact in so few samples: it stays so */
   }
-  if ((o->age % 256u) == 0u) {
+  if ((o->age % ANCHOR_EVERY) == 0u) {
     schedule_anchor(o, (LAW_START + o->age) - 1u);
   }
-  (void)schedule_next(o);
+  schedule_next(o);
   if (o->age > LEAST_AGE) {
     if (schedule_settle(o)) {
       o->settled = 1u;
@@ -70,15 +73,15 @@ static real poles_over(const esokit_state *o, uint32_t samples)
   if (o->settled != 0u) {
     base = CONTRACTION;
   } else if ((LAW_START + o->age) > STATES) {
-    (void)present_poles(o, &base);
+    base = present_poles(o);
   } else {
     /* All at zero. */
   }
   while (rest != 0u) {
     if ((rest & 1u) != 0u) {
-      (void)joined_poles(o, all, base, &all);
+      all = joined_poles(o, all, base);
     }
-    (void)joined_poles(o, base, base, &base);
+    base = joined_poles(o, base, base);
     rest = rest / 2u;
   }
   return all;
@@ -86,12 +89,19 @@ static real poles_over(const esokit_state *o, uint32_t samples)
 
 #endif
 #if ESOKIT_FILTER
-/* ---- The recursion of the gain. */
+/* ---- The recursion of the gain: what was since the last step. */
+
+#define SINCE_CORRECTED 1u
+#if ESOKIT_RETURNS
+#define SINCE_BEGUN 10u /* the gain stands, and nothing was */
+#endif
+#define SINCE_MISSED 4u /* twice in a row, or more */
+#define SINCE_STANDS 8u /* the gain, until a sample is missing */
 
 static void law_begin(esokit_state *o)
 {
 #if ESOKIT_RETURNS
-  o->since = 10u;
+  o->since = SINCE_BEGUN;
 #else
   o->since = 0u;
 #endif
@@ -99,33 +109,32 @@ static void law_begin(esokit_state *o)
 
 static void law_accept(esokit_state *o)
 {
-  o->since = (uint8_t)(o->since | 1u);
+  o->since = (uint8_t)(o->since | SINCE_CORRECTED);
 }
 
-/* since: 1 corrected, 2 nothing yet, 4 missed twice, 8 the gain stands. */
 static void law_advance(esokit_state *o)
 {
   const uint8_t before = o->since;
-  if (before > 8u) {
-    o->since = 8u;
+  if (before > SINCE_STANDS) {
+    o->since = SINCE_STANDS;
     return;
   }
-  if ((before & 1u) != 0u) {
+  if ((before & SINCE_CORRECTED) != 0u) {
     o->since = 0u;
-    (void)filter_corrected(o);
+    filter_corrected(o);
   } else {
-    bool stands = before == 4u;
-    o->since = 4u;
+    bool stands = before == SINCE_MISSED;
+    o->since = SINCE_MISSED;
     if (stands) {
       stands = filter_at_ceiling(o);
     }
     if (!stands) {
-      (void)filter_missed(o);
+      filter_missed(o);
     }
   }
 #if ESOKIT_RETURNS
   if (filter_to_limit(o)) {
-    o->since = 8u;
+    o->since = SINCE_STANDS;
   }
 #endif
 }

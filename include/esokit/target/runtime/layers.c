@@ -3,12 +3,13 @@ R"esokit("
 #endif
 static unsigned predict_outside(esokit_state *o, real u)
 {
-  real acting = u;
-  unsigned status = 0u;
 #if ESOKIT_DELAYED || ESOKIT_KNOWN
-  status = take_input(o, &acting);
+  real acting = u;
+  const unsigned taken = take_input(o, &acting);
+  const unsigned status = taken | predict_core(o, acting);
+#else
+  const unsigned status = predict_core(o, u);
 #endif
-  status = status | predict_core(o, acting);
 #if ESOKIT_WRAPPED
   recentre(o);
 #endif
@@ -39,25 +40,26 @@ static unsigned correct_outside(esokit_state *o, real y)
 #if !ESOKIT_PREDICTIVE
 static unsigned update_outside(esokit_state *o, real y, real u)
 {
-  real acting = u;
-  unsigned status = 0u;
-#if ESOKIT_WRAPPED
-  angle_reading reading;
-#endif
 #if ESOKIT_DELAYED || ESOKIT_KNOWN
-  status = take_input(o, &acting);
+  real acting = u;
+  const unsigned taken = take_input(o, &acting);
+#elif ESOKIT_WRAPPED
+  const real acting = u;
+  const unsigned taken = 0u;
 #endif
 #if ESOKIT_WRAPPED
-  reading = choose_angle(o, y, (uint32_t)o->gap + 1u);
+  const angle_reading reading = choose_angle(o, y, (uint32_t)o->gap + 1u);
   if (reading.counted) {
-    return status |
+    return taken |
       keep_angle(o, &reading, update_core(o, reading.y + (reading.turns * PERIOD), acting));
   }
-  status = status | predict_core(o, acting);
+  const unsigned predicted = predict_core(o, acting);
   recentre(o);
-  return status | correct_outside(o, y);
+  return taken | predicted | correct_outside(o, y);
+#elif ESOKIT_DELAYED || ESOKIT_KNOWN
+  return taken | update_core(o, y, acting);
 #else
-  return status | update_core(o, y, acting);
+  return update_core(o, y, u);
 #endif
 }
 

@@ -49,7 +49,7 @@ static void advance_w(esokit_state *o, unsigned i)
   if ((o->w_is_new != 0u) && is_finite(most) && is_finite(effect)) {
     o->w[i].last = o->w[i].given;
     o->w[i].lost = 0u;
-  } else if (o->w[i].lost <= 65535u) {
+  } else if (o->w[i].lost <= COUNT_MOST) {
     o->w[i].lost = o->w[i].lost + 1u;
   } else {
     /* It has been lost for long. */
@@ -64,15 +64,13 @@ static void advance_w(esokit_state *o, unsigned i)
 /* After a prediction. */
 static void advance_measured(esokit_state *o)
 {
-  real now;
-  real more;
   unsigned i;
   for (i = 0u; i < W_COUNT; ++i) {
     advance_w(o, i);
   }
   o->w_is_new = 0u;
-  now = effect_of_w(o);
-  more = now - o->w_given;
+  const real now = effect_of_w(o);
+  const real more = now - o->w_given;
   if ((more < 0.0) || (more > 0.0)) {
     if (load(o, more)) {
       o->w_given = now;

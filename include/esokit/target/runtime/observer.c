@@ -3,6 +3,11 @@ R"esokit("
 #endif
 /* ---- What counts and chooses. */
 
+#define COUNT_MOST 65535u /* of what is counted in 16 bits: more is as much */
+#if ESOKIT_GATED
+#define GATE_SHARE 0.015625 /* of an innovation in their mean */
+#endif
+
 #if ESOKIT_DELAYED || ESOKIT_MEASURED
 /* Of a ring. */
 static uint16_t next_place(uint16_t place, uint16_t last)
@@ -59,9 +64,9 @@ static void recover(esokit_state *o, unsigned elapsed)
 {
   const uint32_t more = recovery_of[elapsed - 1u];
   const uint32_t due = (uint32_t)o->due + more;
-  if ((o->due < 65535u) && (due > 0u)) { /* else it is more than can be counted: until a restart */
-    o->due = 65535u;
-    if (due < 65536u) {
+  if ((o->due < COUNT_MOST) && (due > 0u)) { /* else it is more than counted: until a restart */
+    o->due = COUNT_MOST;
+    if (due <= COUNT_MOST) {
       o->due = (uint16_t)(due - 1u);
     }
   }
@@ -99,9 +104,9 @@ static bool restart_plain(esokit_state *o, real y)
 
 static unsigned predict_plain(esokit_state *o, real given)
 {
-  unsigned status = 0u;
   const bool good = predict_step(o, given);
-  if (o->gap < 65535u) {
+  unsigned status = 0u;
+  if (o->gap < COUNT_MOST) {
     o->gap = (uint16_t)(o->gap + 1u);
   }
   if (good) {
@@ -109,12 +114,12 @@ static unsigned predict_plain(esokit_state *o, real given)
   }
   if (is_finite(given) && !(fabs(given) > fabs(o->u_applied))) { /* u is not the cause */
     o->u_applied = given;
-    o->gap = 65535u;
+    o->gap = COUNT_MOST;
     status = ESOKIT_PREDICTION_DROPPED;
   } else if (predict_step(o, o->u_applied)) {
     status = ESOKIT_INPUT_REJECTED;
   } else {
-    o->gap = 65535u;
+    o->gap = COUNT_MOST;
     status = ESOKIT_INPUT_REJECTED | ESOKIT_PREDICTION_DROPPED;
   }
   return status;
@@ -166,7 +171,6 @@ static bool gate_lets_in(esokit_state *o, real y)
   const real innovation = y - o->DESIGN_Y;
   const real distance = fabs(innovation);
   real most = usual;
-  bool is_near;
   if (!is_finite(innovation)) {
     return true;
   }
@@ -177,13 +181,13 @@ static bool gate_lets_in(esokit_state *o, real y)
   if (o->gap > 1u) {
     most = usual * (real)o->gap;
   }
-  is_near = distance <= most;
+  const bool is_near = distance <= most;
   if (!is_near && (o->gate_open == 0u) && (o->gate_count < GATE_MOST)) {
     o->gate_count = (uint16_t)(o->gate_count + 1u);
     return false;
   }
   o->gate_mean =
-    o->gate_mean + ((((distance < usual) ? distance : usual) - o->gate_mean) * 0.015625);
+    o->gate_mean + ((((distance < usual) ? distance : usual) - o->gate_mean) * GATE_SHARE);
   if ((o->gate_open != 0u) && is_near) {
     o->gate_count = (uint16_t)(o->gate_count + 1u);
     if (o->gate_count >= GATE_MOST) {

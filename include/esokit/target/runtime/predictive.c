@@ -2,6 +2,14 @@
 R"esokit("
 #endif
 #if ESOKIT_PREDICTIVE
+/* What was done since the last prepare. */
+#define PHASE_PREPARED 0u
+#define PHASE_MEASURED 1u
+#define PHASE_MISSING 2u
+#define PHASE_MEASURED_AND_APPLIED 3u
+#define PHASE_MISSING_AND_APPLIED 4u
+#define PHASE_STARTED 5u
+
 /* Of the reference is it known by what would be computed with it. */
 static void report_reference(esokit_state *o, real used)
 {
@@ -12,17 +20,12 @@ static void report_reference(esokit_state *o, real used)
 
 static void arm_specially(esokit_state *o)
 {
-  real feed = 0.0;
-  if (o->mode == ESOKIT_START_HOLD) {
-    (void)arm_at(o, 0.0, &feed);
-  } else {
 #if ESOKIT_HOLDS_SAFE
-    (void)arm_at(o, o->u_last, &feed);
+  const real safe = o->u_last;
 #else
-    (void)arm_at(o, SAFE_INPUT, &feed);
+  const real safe = SAFE_INPUT;
 #endif
-  }
-  report_reference(o, feed);
+  report_reference(o, arm_at(o, (o->mode == ESOKIT_START_HOLD) ? 0.0 : safe));
 }
 
 /* What of the next u does not need its measurement. */
@@ -35,9 +38,7 @@ static void arm(esokit_state *o)
   }
 #if ESOKIT_SCHEDULE
   if (o->age <= LEAST_AGE) { /* too early for estimates */
-    real u = 0.0;
-    (void)arm_blanked(o, &u);
-    report_reference(o, u);
+    report_reference(o, arm_blanked(o));
     return;
   }
 #endif
@@ -47,9 +48,7 @@ static void arm(esokit_state *o)
     good = arm_after(o, o->gap);
   }
   if (!good) {
-    real u = 0.0;
-    (void)arm_blind(o, &u);
-    report_reference(o, u);
+    report_reference(o, arm_blind(o));
   }
 }
 
@@ -96,10 +95,10 @@ unsigned esokit_start(esokit_state *o, real y, real u)
   up_to_date(o);
   o->hold_left = 0u;
   o->mode = ESOKIT_RUNNING;
-  (void)take_output(o, u);
-  (void)track(o);
-  o->phase = 5u;
-  (void)refer(o, DESIGN_R_AT_REST);
+  take_output(o, u);
+  track(o);
+  o->phase = PHASE_STARTED;
+  refer(o, DESIGN_R_AT_REST);
   arm(o);
   return 0u;
 }
@@ -114,7 +113,7 @@ unsigned esokit_reset(esokit_state *o, real y)
 #else
     o->mode = ESOKIT_RUNNING;
 #endif
-    o->phase = 0u;
+    o->phase = PHASE_PREPARED;
     arm(o);
     status = 0u;
   }
@@ -123,26 +122,25 @@ unsigned esokit_reset(esokit_state *o, real y)
 
 static real control_now(esokit_state *o, real y)
 {
-  real u = 0.0;
 #if ESOKIT_WATCHED
+  real u;
   if (gate_lets_in(o, y)) {
-    (void)control_by(o, y, &u);
+    u = control_by(o, y);
   } else {
-    (void)control_blind(o, &u);
+    u = control_blind(o);
   }
 #else
-  (void)control_by(o, y, &u);
+  const real u = control_by(o, y);
 #endif
   o->measurement = y;
-  o->phase = 1u;
+  o->phase = PHASE_MEASURED;
   return u;
 }
 
 real esokit_control_without_measurement(esokit_state *o)
 {
-  real u = 0.0;
-  (void)control_blind(o, &u);
-  o->phase = 2u;
+  const real u = control_blind(o);
+  o->phase = PHASE_MISSING;
   return u;
 }
 
@@ -150,28 +148,28 @@ static unsigned prepare_next(esokit_state *o, DESIGN_NEXT_R)
 {
   unsigned status = 0u;
   real given = o->u_last;
-  if (o->phase == 1u) {
+  if (o->phase == PHASE_MEASURED) {
     status = correct_outside(o, o->measurement);
   } else {
-    if (o->phase == 3u) {
+    if (o->phase == PHASE_MEASURED_AND_APPLIED) {
       status = correct_outside(o, o->measurement);
     }
-    if ((o->phase == 3u) || (o->phase == 4u)) {
+    if ((o->phase == PHASE_MEASURED_AND_APPLIED) || (o->phase == PHASE_MISSING_AND_APPLIED)) {
       given = o->u_held;
     }
   }
 #if ESOKIT_WAITS
-  (void)settle(o);
+  settle(o);
 #else
-  (void)track(o);
+  track(o);
 #endif
   status = status | predict_outside(o, given);
-  if ((o->phase != 1u) || (status != 0u) || (o->mode != ESOKIT_RUNNING)) {
+  if ((o->phase != PHASE_MEASURED) || (status != 0u) || (o->mode != ESOKIT_RUNNING)) {
     judge_next(o);
   }
-  o->phase = 0u;
+  o->phase = PHASE_PREPARED;
   o->status = (uint16_t)status;
-  (void)refer(o, DESIGN_NEXT_R_GIVEN);
+  refer(o, DESIGN_NEXT_R_GIVEN);
   arm(o);
   return o->status;
 }
@@ -199,18 +197,20 @@ unsigned esokit_applied(esokit_state *o, real u)
   if (!is_finite(u)) {
     return ESOKIT_INPUT_REJECTED;
   }
-  if (o->phase == 5u) {
-    (void)take_output(o, u);
-    (void)track(o);
+  if (o->phase == PHASE_STARTED) {
+    take_output(o, u);
+    track(o);
   }
-  if ((o->phase == 0u) || (o->phase == 5u)) {
+  if ((o->phase == PHASE_PREPARED) || (o->phase == PHASE_STARTED)) {
     if (!revise(o, u)) {
       status = ESOKIT_INPUT_REJECTED;
     }
     arm(o);
   } else {
     o->u_held = u;
-    o->phase = ((o->phase == 1u) || (o->phase == 3u)) ? 3u : 4u;
+    o->phase = ((o->phase == PHASE_MEASURED) || (o->phase == PHASE_MEASURED_AND_APPLIED))
+      ? PHASE_MEASURED_AND_APPLIED
+      : PHASE_MISSING_AND_APPLIED;
   }
   return status;
 }

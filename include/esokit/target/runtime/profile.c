@@ -41,11 +41,10 @@ static real longer(real time, real least)
 static real duration(const esokit_state *o, real target)
 {
   const real way = fabs(target - o->target);
-  real time = 0.0;
+  real time = SHORTEST_TIME;
   if (!(way > 0.0)) {
-    return time;
+    return 0.0;
   }
-  time = SHORTEST_TIME;
 #if ESOKIT_LIMITED_1
   time = longer(time, (way / ROOT_OF_LIMIT_1) * ROOT_OF_PEAK_1);
 #endif
@@ -113,7 +112,6 @@ void esokit_motion(const esokit_state *o, real motion[COUNT])
   const real count = (real)o->samples;
   real step[COUNT];
   real scale = way;
-  real x;
   unsigned i;
   motion[0] = o->target;
   for (i = 1u; i < COUNT; ++i) {
@@ -122,7 +120,7 @@ void esokit_motion(const esokit_state *o, real motion[COUNT])
   if (!esokit_moves(o)) {
     return;
   }
-  x = (real)o->sample / count;
+  const real x = (real)o->sample / count;
   smooth_step(1.0 - x, step);
   motion[0] = o->target - (way * step[0]); /* from the nearer end: exact there */
   if (!(x > 0.5)) {

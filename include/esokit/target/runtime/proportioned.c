@@ -36,7 +36,6 @@ static int32_t nearest(const esokit_state *o, real wanted)
 static void plan(esokit_state *o, real u)
 {
   real inside = u;
-  real wanted;
   if (!is_finite(u)) {
     o->on_samples = 0;
     o->carried = 0.0;
@@ -48,7 +47,7 @@ static void plan(esokit_state *o, real u)
   if (inside > HIGH) {
     inside = HIGH;
   }
-  wanted = ((real)WINDOW * ((inside - OFF_VALUE) / RANGE)) + o->carried;
+  const real wanted = ((real)WINDOW * ((inside - OFF_VALUE) / RANGE)) + o->carried;
   o->on_samples = nearest(o, wanted);
   o->carried = wanted - (real)o->on_samples;
 }
@@ -67,11 +66,10 @@ bool esokit_begins(const esokit_state *o)
 
 bool esokit_update(esokit_state *o, real u)
 {
-  bool is_on;
   if (o->sample == 0) {
     plan(o, u);
   }
-  is_on = o->sample < o->on_samples;
+  const bool is_on = o->sample < o->on_samples;
   if (o->sample < LAST_SAMPLE) {
     o->sample = o->sample + 1;
   } else {
