@@ -152,6 +152,43 @@ TEST(CSelfTest, FailsWhereTheCodeWasChanged) {
           0.0F);
 }
 
+/// Also where only what is reported is another.
+TEST(CSelfTest, FailsWhereAStatusWasChanged) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  const CodeOptions loop{.name = "loop"};
+  const std::vector<Change> of_observers{
+      {"status = LOOP_MEASUREMENT_REJECTED", "status = 0u"},
+      {"status = LOOP_INPUT_REJECTED;", "status = 0u;"},
+      {"LOOP_INPUT_REJECTED | LOOP_PREDICTION_DROPPED", "LOOP_PREDICTION_DROPPED"},
+      {"LOOP_INPUT_REJECTED | LOOP_PREDICTION_DROPPED", "LOOP_INPUT_REJECTED"},
+      {"status = LOOP_GAP_BRIDGED", "status = 0u"},
+      {"status = LOOP_RESTARTED", "status = LOOP_GAP_BRIDGED"},
+      {"(elapsed > 1u)", "(elapsed > 2u)"},
+      {"return status | correct_plain(o, y)", "return (status & 0u) | correct_plain(o, y)"}};
+  notices(to_c(Observer::make(settings_of_observer()).value(), loop).value(), of_observers, 0.0F);
+  std::vector<Change> of_loops = of_observers;
+  of_loops.insert(of_loops.end(),
+                  {{"return LOOP_STATE_REJECTED", "return 0u"},
+                   {"return LOOP_INPUT_REJECTED", "return 0u"},
+                   {"(o->status | LOOP_REFERENCE_REJECTED)", "LOOP_REFERENCE_REJECTED"},
+                   {"(o->status | LOOP_REFERENCE_REJECTED)", "(o->status)"},
+                   {"o->status = (uint16_t)status", "o->status |= (uint16_t)status"},
+                   {"o->mode = LOOP_SAFE", "o->mode = LOOP_RUNNING"},
+                   {"  o->mode = LOOP_RUNNING;\n  o->elsewhere = 1u", "  o->elsewhere = 1u"}});
+  notices(to_c(controller<Adrc<Observer>>(), loop).value(), of_loops, 0.0F);
+  notices(to_c(controller<PredictiveAdrc<Observer>>(), loop).value(),
+          {{"status = LOOP_MEASUREMENT_REJECTED", "status = 0u"},
+           {"status = LOOP_GAP_BRIDGED", "status = 0u"},
+           {"status = LOOP_RESTARTED", "status = LOOP_GAP_BRIDGED"},
+           {"return LOOP_STATE_REJECTED", "return 0u"},
+           {"status = LOOP_STATE_REJECTED", "status = 0u"},
+           {"return LOOP_INPUT_REJECTED", "return 0u"},
+           {"(o->status | LOOP_REFERENCE_REJECTED)", "(o->status)"},
+           {"o->status = (uint16_t)status", "o->status |= (uint16_t)status"},
+           {"o->mode = LOOP_SAFE", "o->mode = LOOP_RUNNING"}},
+          0.0F);
+}
+
 TEST(CSelfTest, FailsWhereIntegersWereChanged) {
   if (!there("gcc")) GTEST_SKIP() << "no gcc";
   notices(in_integers<Adrc<LinearEso<2>>>(),

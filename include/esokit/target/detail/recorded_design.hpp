@@ -418,22 +418,27 @@ void take_samples(RecordedDesign& design, C played) {
   take_self_test<V, inputs>(
       design, law,
       [&](TestCall call, V y, const auto& beside, int row) {
-        if (call == TestCall::starts) (void)played.start(y, beside(0));
-        if (call == TestCall::reports) (void)played.applied(beside(0));
         using Of = typename ObserverOfController<C>::type;
-        const bool given = call == TestCall::measures && give_measured<Of>(played, y);
-        if (given || call == TestCall::starts || call == TestCall::reports) {
-          return V(estimate_of(played.observer(), row));
-        }
+        const auto with_mode = [&](V number, auto status) {
+          const auto mode = static_cast<unsigned>(played.mode());
+          return TestResult<V>{number, static_cast<unsigned>(status) + of_mode * mode};
+        };
+        const auto estimated = [&](auto status) {
+          return with_mode(estimate_of(played.observer(), row), status);
+        };
+        if (call == TestCall::starts) return estimated(played.start(y, beside(0)));
+        if (call == TestCall::reports) return estimated(played.applied(beside(0)));
+        if (call == TestCall::measures && give_measured<Of>(played, y)) return estimated(0U);
         const bool rests = call == TestCall::rests;
         if (!rests && call != TestCall::misses) {
-          return V(played.update(y, reference<inputs>(beside)));
+          const V u = played.update(y, reference<inputs>(beside));
+          return with_mode(u, played.status());
         }
         for (int left = static_cast<int>(y); left > 0; --left) {
           (void)(rests ? played.update(beside(0), reference<inputs>(beside))
                        : played.update_without_measurement(reference<inputs>(beside)));
         }
-        return V(played.output());
+        return with_mode(played.output(), played.status());
       },
       [&](const auto&) { return played.output(); });
 }
@@ -446,21 +451,29 @@ void take_phases(RecordedDesign& design, C played) {
   take_self_test<V, inputs>(
       design, std::abs(law),
       [&](TestCall call, V y, const auto& beside, int row) {
-        if (call == TestCall::starts) (void)played.start(y, beside(0));
-        if (call == TestCall::reports) (void)played.applied(beside(0));
-        if (call == TestCall::resets) (void)played.reset(y);
-        if (call == TestCall::starts || call == TestCall::reports || call == TestCall::resets) {
-          return V(estimate_of(played.observer(), row));
-        }
+        const auto with_mode = [&](V number, StepStatus status) {
+          const auto mode = static_cast<unsigned>(played.mode());
+          return TestResult<V>{number, static_cast<unsigned>(status) + of_mode * mode};
+        };
+        const auto estimated = [&](StepStatus status) {
+          return with_mode(estimate_of(played.observer(), row), status);
+        };
+        if (call == TestCall::starts) return estimated(played.start(y, beside(0)));
+        if (call == TestCall::reports) return estimated(played.applied(beside(0)));
+        if (call == TestCall::resets) return estimated(played.reset(y));
         int left = call == TestCall::misses ? static_cast<int>(y) : 1;
         V u{};
+        StepStatus status{};
         for (; left > 0; --left) {
           const bool lost = call == TestCall::misses || call == TestCall::loses;
           u = lost ? V(played.control_without_measurement()) : V(played.control(y));
-          if (call == TestCall::splits || call == TestCall::loses) (void)played.applied(beside(0));
-          (void)played.prepare(reference<inputs>(beside));
+          status = {};
+          if (call == TestCall::splits || call == TestCall::loses) {
+            status = played.applied(beside(0));
+          }
+          status = status | played.prepare(reference<inputs>(beside));
         }
-        return u;
+        return with_mode(u, status);
       },
       [&](const auto&) { return played.output(); });
 }
@@ -595,16 +608,17 @@ Expected<RecordedDesign, Error<typename Observer::scalar_type>> recorded_design(
   take_self_test<V, 1>(
       maker.design, 0,
       [&](TestCall call, V y, const auto& u, int row) {
+        StepStatus status{};
         if (call == TestCall::misses) {
-          for (int left = static_cast<int>(y); left > 0; --left) (void)played.predict(u(0));
+          for (int left = static_cast<int>(y); left > 0; --left) status = played.predict(u(0));
         } else if (call == TestCall::starts || call == TestCall::resets) {
-          (void)played.reset(y);
+          status = played.reset(y);
         } else if (call == TestCall::corrects) {
-          (void)played.correct(y);
+          status = played.correct(y);
         } else if (call != TestCall::measures || !give_measured<Observer>(played, y)) {
-          (void)played.update(y, u(0));
+          status = played.update(y, u(0));
         }
-        return estimate_of(played, row);
+        return TestResult<V>{estimate_of(played, row), static_cast<unsigned>(status)};
       },
       [](const auto& u) { return u(0); });
   return maker.design;

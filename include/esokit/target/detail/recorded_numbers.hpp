@@ -221,7 +221,7 @@ struct RecordedDesign {
   bool compensates = false;                    ///< r is the output of another controller
   bool predictive = false;                     ///< in two phases
   unsigned hold = 0;                           ///< of one of these: samples of its start hold
-  std::vector<std::vector<double>> samples{};  ///< y, r or u, and the result
+  std::vector<std::vector<double>> samples{};  ///< y, r or u, result, status
   std::vector<unsigned> test_calls{};          ///< what of it is called, see self_test.hpp
 
   /// The mode in which it begins.

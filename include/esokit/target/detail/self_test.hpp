@@ -45,6 +45,15 @@ struct PlannedCall {
   double beside = std::numeric_limits<double>::quiet_NaN();  ///< r or u
 };
 
+/// What a call gives.
+template <class V>
+struct TestResult {
+  V number;         ///< u, or an estimate
+  unsigned status;  ///< that is returned, or of the sample
+};
+
+inline constexpr unsigned of_mode = 512;  ///< times the mode, in the status that is compared
+
 /// What the calls of a self-test depend on.
 struct TestNumbers {
   unsigned longest;  ///< gap that has a gain, samples
@@ -95,6 +104,9 @@ inline PlannedCall planned(int sample, const TestNumbers& of) {
       PlannedCall{71, TestCall::starts, 0, of.largest, -of.huge},
       PlannedCall{72, TestCall::reports, bad_y, 4, of.huge},
       PlannedCall{73, TestCall::update, bad_y, 4},
+      // The u that is kept leads beyond, too.
+      PlannedCall{74, TestCall::resets, 0, of.largest, of.step},
+      PlannedCall{.sample = 75, .call = TestCall::update, .beside = of.largest},
       PlannedCall{.sample = 76, .call = TestCall::starts, .beside = 0},
       // What is reported after a start is the u that a bad r leaves as it is.
       PlannedCall{.sample = 77, .call = TestCall::reports, .beside = of.step},
@@ -142,7 +154,7 @@ auto estimate_of(const Observer& observer, int row) {
 
 /// The samples of a self-test.
 /// @tparam V their scalar @tparam inputs beside y: (u) or (r, r', ..)
-/// @param law the gain of the law, u per r, or 0 @param calls gives u or an estimate for a call, y,
+/// @param law the gain of the law, u per r, or 0 @param calls gives a TestResult for a call, y,
 /// what is beside it and a row @param output the u that moves the plant then
 template <class V, int inputs, class Calls, class Output>
 void take_self_test(RecordedDesign& design, double law, Calls&& calls, Output&& output) {
@@ -183,7 +195,9 @@ void take_self_test(RecordedDesign& design, double law, Calls&& calls, Output&& 
     for (const V& one : beside) sample.push_back(static_cast<double>(one));
     if ((plan.bad & bad_y) != 0) y = y * largest;
     if ((plan.bad & bad_beside) != 0) beside(0) = beside(0) * largest;
-    sample.push_back(static_cast<double>(calls(plan.call, y, beside, row)));
+    const TestResult<V> result = calls(plan.call, y, beside, row);
+    sample.push_back(static_cast<double>(result.number));
+    sample.push_back(static_cast<double>(result.status));
     design.samples.push_back(std::move(sample));
     if (k < most_calls) {
       design.test_calls.push_back(static_cast<unsigned>(plan.call) + plan.bad +

@@ -452,15 +452,15 @@ class CDesign {
                                       : names.size() > 1
                                           ? "the reference, with its derivatives r1, .."
                                           : "the reference");
-    text_.constant("COLUMNS", std::to_string(names.size() + 2) + "u");
+    text_.constant("COLUMNS", std::to_string(names.size() + 3) + "u");
     text_.replace("DESIGN_SAMPLE_R", counted(d.references(), [](int i) {
                     return i == 0 ? "r" : "given[" + std::to_string(i + 1) + "]";
                   }));
     text_.replace(
         "DESIGN_COLUMNS",
         !d.predictive && !d.is_controller
-            ? "y, u, the disturbance"
-            : "y, " + listed(d.references(d.predictive ? "next r" : "r"), itself) + ", u");
+            ? "y, u, the disturbance, status"
+            : "y, " + listed(d.references(d.predictive ? "next r" : "r"), itself) + ", u, status");
   }
   std::string recovery() const {
     return listed(design_.recovery, [](unsigned due) { return std::to_string(due) + "u"; });

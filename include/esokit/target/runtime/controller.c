@@ -562,6 +562,7 @@ bool esokit_load(esokit_state *o, const esokit_saved *from, uint32_t samples, re
 #define CALL_BAD_Y 16u
 #define CALL_BAD_BESIDE 32u
 #define CALL_ROW 64u
+#define CALL_MODE 512u /* times the mode, in a status */
 
 #if ESOKIT_MEASURED
 static void measure_all(esokit_state *o, real w)
@@ -579,8 +580,8 @@ static void measure_all(esokit_state *o, real w)
 }
 
 #endif
-/* u, or an estimate where the call gives none. */
-static real called(esokit_state *o, unsigned call, const real given[COLUMNS])
+/* u, or an estimate where the call gives none; and the status, with the mode. */
+static real called(esokit_state *o, unsigned call, const real given[COLUMNS], unsigned *status)
 {
   const unsigned kind = call % CALL_KINDS;
   const unsigned row = call / CALL_ROW;
@@ -588,6 +589,7 @@ static real called(esokit_state *o, unsigned call, const real given[COLUMNS])
   real r = given[1]; /* or u */
   real result = 0.0;
   unsigned left = 1u;
+  *status = 0u;
   if ((call & CALL_BAD_Y) != 0u) {
     y = y * LARGEST;
   }
@@ -599,32 +601,34 @@ static real called(esokit_state *o, unsigned call, const real given[COLUMNS])
   }
 #if ESOKIT_CONTROLLER || ESOKIT_PREDICTIVE
   if (kind == CALL_STARTS) {
-    (void)esokit_start(o, y, r);
+    *status = esokit_start(o, y, r);
     result = esokit_estimate(o, row);
   } else if (kind == CALL_REPORTS) {
-    (void)esokit_applied(o, r);
+    *status = esokit_applied(o, r);
     result = esokit_estimate(o, row);
 #if ESOKIT_PREDICTIVE
   } else if (kind == CALL_RESETS) {
-    (void)esokit_reset(o, y);
+    *status = esokit_reset(o, y);
     result = esokit_estimate(o, row);
   } else if ((kind == CALL_MISSES) || (kind == CALL_LOSES)) {
     while (left > 0u) {
       result = esokit_control_without_measurement(o);
+      *status = 0u;
       if (kind == CALL_LOSES) {
-        (void)esokit_applied(o, r);
+        *status = esokit_applied(o, r);
       }
-      (void)esokit_prepare(o, DESIGN_SAMPLE_R);
+      *status = *status | esokit_prepare(o, DESIGN_SAMPLE_R);
       left = left - 1u;
     }
   } else if (kind == CALL_SPLITS) {
     result = esokit_control(o, y);
-    (void)esokit_applied(o, r);
-    (void)esokit_prepare(o, DESIGN_SAMPLE_R);
+    *status = esokit_applied(o, r);
+    *status = *status | esokit_prepare(o, DESIGN_SAMPLE_R);
 #else
   } else if (kind == CALL_MISSES) {
     while (left > 0u) {
       result = esokit_update_without_measurement(o, DESIGN_SAMPLE_R);
+      *status = o->status;
       left = left - 1u;
     }
 #endif
@@ -642,23 +646,25 @@ static real called(esokit_state *o, unsigned call, const real given[COLUMNS])
 #endif
   } else {
     result = esokit_update(o, y, DESIGN_SAMPLE_R);
+    *status = o->status;
   }
+  *status = *status + ((unsigned)o->mode * CALL_MODE);
 #else
   if (kind == CALL_MISSES) {
     while (left > 0u) {
-      (void)esokit_predict(o, r);
+      *status = esokit_predict(o, r);
       left = left - 1u;
     }
   } else if ((kind == CALL_STARTS) || (kind == CALL_RESETS)) {
-    (void)esokit_reset(o, y);
+    *status = esokit_reset(o, y);
   } else if (kind == CALL_CORRECTS) {
-    (void)esokit_correct(o, y);
+    *status = esokit_correct(o, y);
 #if ESOKIT_MEASURED
   } else if (kind == CALL_MEASURES) {
     measure_all(o, y);
 #endif
   } else {
-    (void)esokit_update(o, y, r);
+    *status = esokit_update(o, y, r);
   }
   result = esokit_estimate(o, row);
 #endif
@@ -675,8 +681,10 @@ int esokit_self_test(real tolerance)
   int i;
   esokit_init(&o);
   for (i = 0; i < SAMPLES; ++i) {
-    const real result = called(&o, (i < CALLS) ? calls[i] : CALL_LATER, samples[i]);
-    if (!(fabs(result - samples[i][COLUMNS - 1u]) <= tolerance)) {
+    unsigned status;
+    const real result = called(&o, (i < CALLS) ? calls[i] : CALL_LATER, samples[i], &status);
+    if (!(fabs(result - samples[i][COLUMNS - 2u]) <= tolerance) ||
+        (status != (unsigned)samples[i][COLUMNS - 1u])) {
       return i + 1;
     }
   }

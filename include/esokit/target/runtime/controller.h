@@ -292,7 +292,7 @@ bool esokit_load(esokit_state *o, const esokit_saved *from, uint32_t samples, re
 #endif
 #ifdef ESOKIT_SELF_TEST
 /* 0, or the number of the first sample whose result differs from that of the design by more than
- * `tolerance`; 0 asks for equal numbers. */
+ * `tolerance`, or whose status does; 0 asks for equal numbers. */
 int esokit_self_test(real tolerance);
 #endif
 
