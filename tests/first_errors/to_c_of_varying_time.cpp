@@ -1,4 +1,4 @@
-// expect: esokit: to_c does not write VariableTime, .* after a pause of k T call update_without_measurement k - 1 times
+// expect: esokit: to_c does not write VariableTime, .* update_without_measurement k - 1
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/target/c_code.hpp>
