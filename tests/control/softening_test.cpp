@@ -119,6 +119,27 @@ TEST(Softening, IsTheFormula) {
   follows_the_formula<3>(-2, {27e3, 4000, 60});
 }
 
+/// An overload is more than 1.1 of half the range on either side; s goes down to 1/200 and no
+/// further.
+TEST(Softening, BothSidesOfAnOverloadAndOfTheSlowest) {
+  const auto law = esokit::AdrcLaw<1>::make({.gains = {{40.0}}, .input_gain = 2}).value();
+  const Limits<double> limits{.lower = -1, .upper = 2};
+  const auto limiter = esokit::Limiter<double>::make(limits, period).value();
+  const double beyond = 0.05 * (2.0 - -1.0);
+  for (const double side : {1.0, -1.0}) {
+    const double edge = side > 0 ? 2 + beyond : -1 - beyond;
+    auto soft = esokit::Softening<1>::make(law, limits, true).value();
+    soft.judge(edge, limiter, period);
+    EXPECT_EQ(soft.slowness(), 1);
+    soft.judge(std::nextafter(edge, 9 * side), limiter, period);
+    EXPECT_NEAR(soft.slowness(), 1.04, 1e-15);
+    for (int k = 0; k < 4974; ++k) soft.judge(9 * side, limiter, period);
+    EXPECT_NEAR(soft.slowness(), 200, 1e-9);
+    for (int k = 0; k < 9; ++k) soft.judge(9 * side, limiter, period);
+    EXPECT_EQ(soft.slowness(), 200);
+  }
+}
+
 TEST(Softening, ErrorBasedEqualsOutputBasedForAConstantReference) {
   using Output = Adrc<LinearEso<3>>;
   auto output = Output::make(settings<Output>(80, 20, -2)).value();
