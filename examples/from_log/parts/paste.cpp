@@ -176,10 +176,10 @@ Watch watch_of(const Tuning& tuning, const TunedDesign& design, const esokit::Fi
   watch.divider = std::clamp(static_cast<int>(0.5 / (watch.bandwidth * T)), 1, 1000);
   watch.latency = printed(model.dead_time + (design.knows.lag ? 0.0 : model.lag) +
                           (design.knows.sensor ? 0.0 : model.sensor));
-  // Long enough for the slower evidence behind a latency.
+  // At least what the monitor asks for behind its latency.
   watch.memory = printed(
       std::max(200.0 / watch.bandwidth,
-               80.0 * (1.0 / watch.bandwidth + watch.latency / (model.order + design.extension))));
+               10.0 * (1.0 / watch.bandwidth + watch.latency / (model.order + design.extension))));
   const double rms = std::max(quantile(innovations, 0.95) / 1.96, model.noise);
   const double by_noise =
       esokit::detail::with_number<2, 5>(model.order + design.extension, [&](auto size) {
