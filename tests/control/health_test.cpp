@@ -125,7 +125,8 @@ TEST(Health, RatioWithALagInTheModel) {
 }
 
 /// A dead time of 4 / omega_o that the observer does not have: at the beginning u seems to do
-/// nothing. Told of it, the monitor accuses nobody, and finds what its filters say of b / b0.
+/// nothing. With its `latency` the monitor accuses nobody, and finds what its filters say of b /
+/// b0.
 TEST(Health, ADeadTimeIsNoGainThatIsTooLarge) {
   constexpr int late = 40;
   constexpr double w = 4 * std::numbers::pi;
