@@ -207,6 +207,17 @@ TEST(Clock, FractionsThatAreRoundInAnotherUnit) {
   EXPECT_FALSE(from_log::judge_clock(read(jitter)).decided());
 }
 
+// 8 s are 0.0000926 days but for a ten-thousandth, and days from anywhere have no fewer digits.
+TEST(Clock, DaysFromAnywhereAreNoSeconds) {
+  for (const double apart : {4.0, 7.5, 8.0, 40.0}) {
+    for (const double begin : {26.741662, 4884.910604, 323828.015166}) {
+      const auto verdict = from_log::judge_clock(read(written(begin, 86400, apart, 500, 11)));
+      EXPECT_TRUE(!verdict.decided() || verdict.doubtful || verdict.unit > 86399)
+          << apart << " s from " << begin << " s is read as " << verdict.unit << " s";
+    }
+  }
+}
+
 // A date that few have is no date where a clock that has run for days is as likely.
 TEST(Clock, CountersOfWeeksAreNoDatesOfOldEpochs) {
   const double at = 40 * day + 1.25;

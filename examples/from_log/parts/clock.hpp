@@ -101,7 +101,7 @@ namespace detail {
 /// Whether it has at most three digits, or is a usual time.
 inline bool three_digits(double value) {
   const double scale = std::pow(10.0, 2 - std::floor(std::log10(value)));
-  return std::abs(value * scale - std::round(value * scale)) < 1e-4 * value * scale;
+  return std::abs(value * scale - std::round(value * scale)) < 2e-5 * value * scale;
 }
 inline bool one_of(double value, std::initializer_list<double> all, double near_by) {
   return std::any_of(all.begin(), all.end(),

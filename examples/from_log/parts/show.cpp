@@ -110,6 +110,15 @@ std::string in_words(const std::string& field, const esokit::Identified& found) 
     return "b0 depends on the size of u: the actuator is not proportional. Log the u that it held, "
            "or steps of one size, as large as those of the controller.";
   }
+  // What passes within few rows shows lag, pole and friction in few of them.
+  const double settles = found.latency.value + 3.0 / found.pole.value;
+  const double rows = settles / (found.log.sample_time * found.averaged);
+  if ((field == "correlation" || field == "interval" || field == "plateau") &&
+      found.pole.value > 0.0 && found.averaged == 1 && rows < 12.0) {
+    return "After a step of u, y settles within " + number_text(std::ceil(rows)) +
+           " rows: too few to tell lag, pole and friction apart with so few steps. Log five times "
+           "as many rows a second, or many more steps.";
+  }
   const auto at = all.find(field);
   return at == all.end() ? "" : at->second;
 }
