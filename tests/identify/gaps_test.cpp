@@ -1,4 +1,6 @@
 // Rows that come in bursts, with a gap every few rows.
+#include <gtest/gtest.h>
+
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -8,8 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "gtest/gtest.h"
-
+namespace esokit_test {
 namespace identify_gaps_test {
 namespace {
 
@@ -126,3 +127,4 @@ TEST(Gaps, OfRowsWithoutTimeAreNumbersThatAreMissing) {
 
 }  // namespace
 }  // namespace identify_gaps_test
+}  // namespace esokit_test
