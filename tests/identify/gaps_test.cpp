@@ -104,6 +104,14 @@ TEST(Gaps, ThatAreLongAreNotBridged) {
   EXPECT_STREQ(prepared.error().field, "rows");
 }
 
+TEST(Gaps, InWhichUMovesAreNotBridged) {
+  Log log = Machine{1.0, 15}.log([](int k, double) { return k % 20 < 10; });
+  for (std::size_t k = 0; k < log.u.size(); ++k) log.u[k] -= 0.1 * log.y[k];
+  const auto prepared = prepare(log);
+  ASSERT_FALSE(prepared);
+  EXPECT_STREQ(prepared.error().field, "rows");
+}
+
 TEST(Gaps, AFewLeaveTheLogAsItIs) {
   const Log log = Machine{1.0, 13}.log([](int k, double) { return k % 600 < 580; });
   const auto prepared = prepare(log);

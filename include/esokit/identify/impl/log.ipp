@@ -231,7 +231,9 @@ inline std::size_t piece_end(const std::vector<double>& time, std::size_t from, 
 /// A sample time that bridges the gaps of rows that come in bursts, which no piece of `T` holds:
 /// the shortest with nine tenths of the rows in pieces. `T` itself if most rows are in pieces, or
 /// there is none up to 5 T: across longer gaps nothing is seen of a machine for which T was chosen.
-inline double bridging_time(const std::vector<double>& time, double T) {
+/// So, too, where u is another one behind half of the gaps: what it was in them is not known.
+inline double bridging_time(const std::vector<double>& time, const std::vector<double>& u,
+                            double T) {
   const auto share_in_pieces = [&](double step) {
     std::size_t rows = 0;
     for (std::size_t from = 0, to = 0; from < time.size(); from = to) {
@@ -242,10 +244,14 @@ inline double bridging_time(const std::vector<double>& time, double T) {
   };
   if (share_in_pieces(T) >= 0.5) return T;
   std::vector<double> gaps;
+  std::size_t moved = 0;
   for (std::size_t k = 1; k < time.size(); ++k) {
     const double step = time[k] - time[k - 1];
-    if (!(step < longest_bridge * T)) gaps.push_back(step);
+    if (step < longest_bridge * T) continue;
+    gaps.push_back(step);
+    moved += u[k] != u[k - 1] ? 1U : 0U;
   }
+  if (2 * moved >= gaps.size()) return T;
   std::sort(gaps.begin(), gaps.end());
   for (const double part : {0.5, 0.75, 0.9, 0.95, 0.98, 0.99}) {
     // A quarter, so that a gap may be a third longer than this one.
@@ -275,7 +281,7 @@ inline Check<double> find_sample_time(const Log& log, const ValidRows& rows, Log
   for (const double step : steps) {
     if (step < 1.6 * middle) square += (step - usual) * (step - usual);
   }
-  report.sample_time = bridging_time(rows.time, usual);
+  report.sample_time = bridging_time(rows.time, rows.u, usual);
   report.burst = report.sample_time > usual ? usual : 0.0;
   report.jitter = log.time.empty() ? log.jitter : std::sqrt(square / regular);
   report.duration = rows.time.back();
