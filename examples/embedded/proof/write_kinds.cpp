@@ -1,7 +1,5 @@
-// Writes the C of each kind that prove.sh proves: NAME.[hc] into a folder NAME of the folder that
-// is given. Prints of each NAME, what it is, and between which limits u has to stay.
+// Writes the C of the kinds that prove.sh proves: of controllers, adapters, profiles and integers.
 #include <cmath>
-#include <cstdio>
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/known_model.hpp>
 #include <esokit/adapter/mapped_input.hpp>
@@ -9,6 +7,7 @@
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
+#include <esokit/control/approach_profile.hpp>
 #include <esokit/control/smooth_profile.hpp>
 #include <esokit/control/time_proportioned.hpp>
 #include <esokit/observer/linear_eso.hpp>
@@ -16,50 +15,13 @@
 #include <esokit/target/fixed_point.hpp>
 #include <esokit/target/profile_code.hpp>
 #include <esokit/target/time_proportioned_code.hpp>
-#include <filesystem>
-#include <fstream>
 #include <string>
-#include <type_traits>
-#include <utility>
+
+#include "kinds.hpp"
 
 namespace {
 
-using namespace esokit;
-
-std::string folder;
-bool all_written = true;
-
-void refused(const std::string& name, const auto& error) {
-  std::fprintf(stderr, "%s: %s %s\n", name.c_str(), error.field, error.rule);
-  all_written = false;
-}
-
-/// @param limits of u, or "- -"
-void write_files(const std::string& name, const std::string& title, const std::string& limits,
-                 const CCode& code) {
-  const std::string at = folder + "/" + name;
-  std::filesystem::create_directories(at);
-  std::ofstream(at + "/" + name + ".h") << code.header;
-  std::ofstream(at + "/" + name + ".c") << code.source;
-  std::printf("%s\t%s\t%s\n", name.c_str(), title.c_str(), limits.c_str());
-}
-
-template <class Made, class... As>
-void write_as(const std::string& name, const std::string& title, const std::string& limits,
-              CodeOptions options, const Made& made, const As&... as) {
-  options.name = name;
-  if (!made) return refused(name, made.error());
-  const auto code = to_c(*made, as..., options);
-  if (!code) return refused(name, code.error());
-  write_files(name, title, limits, *code);
-}
-
-constexpr const char* no_limits = "-\t-";
-
-template <class V>
-Limits<V> limits_of_u() {
-  return {.lower = V(-2), .upper = V(7)};
-}
+using namespace proof_kinds;
 
 struct Pendulum {
   template <class E>
@@ -68,52 +30,6 @@ struct Pendulum {
     return -3.0f * sin(x(0));
   }
 };
-
-template <class Observer>
-auto observer_of() {
-  using V = typename Observer::scalar_type;
-  typename Observer::Config config{};
-  if constexpr (requires { config.observer; }) {
-    config.observer = observer_of<typename Observer::Adapted>();
-    if constexpr (requires { config.delay; }) config.delay = 4;
-    if constexpr (requires { config.threshold; }) config.threshold = V(0.05);
-    if constexpr (requires { config.period; }) config.period = V(6.2831853);
-    if constexpr (requires { config.inputs; }) config.inputs[0] = {V(-3), V(0.003), V(0.002)};
-    if constexpr (requires { config.curve; }) {
-      config.curve = decltype(config.curve)::dead_zone(V(0.5), V(0.25));
-    }
-  } else {
-    config.observer_bandwidth = V(100);
-    config.input_gain = V(50);
-    config.sample_time = V(1e-3);
-    config.max_gap = 3;
-  }
-  return config;
-}
-
-template <class C>
-typename C::Config config_of() {
-  using V = typename C::scalar_type;
-  typename C::Config config{};
-  config.observer = observer_of<std::remove_cvref_t<decltype(std::declval<C&>().observer())>>();
-  if constexpr (requires { config.controller_bandwidth; }) config.controller_bandwidth = V(15);
-  config.limits = limits_of_u<V>();
-  return config;
-}
-
-template <class C, class Change = void (*)(typename C::Config&)>
-void write_controller(
-    const std::string& name, const std::string& title, CodeOptions options = {},
-    Change change = [](typename C::Config&) {}) {
-  auto config = config_of<C>();
-  change(config);
-  write_as(name, title, "-2\t7", options, C::make(config));
-}
-
-template <class Observer>
-void write_observer(const std::string& name, const std::string& title) {
-  write_as(name, title, no_limits, {}, Observer::make(observer_of<Observer>()));
-}
 
 void holds_and_ramps(auto& config) {
   config.limits.rate = 500;
@@ -153,6 +69,14 @@ void write_adapters() {
 }
 
 void write_others() {
+  const auto approach = ApproachProfile<2, 5, float>::make({.pole = 0.1f,
+                                                            .lag = 0.3f,
+                                                            .input_gain = 2.0f,
+                                                            .limits = {.lower = -10, .upper = 70},
+                                                            .dead_time = 0.08f,
+                                                            .bandwidth = 1.5f,
+                                                            .sample_time = 0.02f});
+  write_as("approach", "`ApproachProfile<2, 5, float>`", no_limits, {}, approach);
   SmoothProfileConfig<2, float> profile{.sample_time = 0.004f};
   profile.limits = {3.0f, 20.0f};
   write_as("profile", "`SmoothProfile<2, float>`", no_limits, {},
