@@ -39,9 +39,8 @@ BROKEN = (
     ("plain", "a check left out",
      "  if (!is_finite(u)) {\n    return PLAIN_INPUT_REJECTED;\n  }\n  if (o->", "  if (o->",
      "finite_u_last"),
-    ("cascade", "a level that a restart does not check",
-     "const bool t2 = is_finite((0.0f + (fabsf((t1 + t1)))))", "const bool t2 = true",
-     "finite_z1_level2"),
+    ("cascade", "a number left out of a check", "(fabsf(z1_level2_next)) + (fabsf(z1_next)))));\n  const bool t10",
+     "(fabsf(z1_next)))));\n  const bool t10", "finite_z1_level2"),
     ("predictive", "a y that is not checked", "(is_finite((x2 * y))) ? t1 : x4", "t1", "u_within"),
 )
 # And to the step in integers, each of which may then be too large for its line or its state.
