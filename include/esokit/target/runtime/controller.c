@@ -509,6 +509,7 @@ static void pass_sample(esokit_state *o, real u)
 {
 #if ESOKIT_CONTROLLER
   skip_sample(o, u);
+  judge_missing(o);
 #else
   (void)observe_predict(o, u);
 #endif
