@@ -82,6 +82,7 @@ inline PlannedCall planned(int sample, const TestNumbers& of) {
       PlannedCall{33, TestCall::misses, 0, many(of.longest + 1)},
       PlannedCall{34, TestCall::update, bad_y, 4},
       PlannedCall{36, TestCall::misses, 0, many(of.limit)},
+      PlannedCall{39, TestCall::misses, 0, many(of.limit)},
       PlannedCall{.sample = 40, .call = TestCall::starts, .beside = 0},
       PlannedCall{43, TestCall::starts, bad_y, 4, 0},
       PlannedCall{.sample = 44, .call = TestCall::starts, .bad = bad_beside, .beside = 4},
@@ -103,7 +104,7 @@ inline PlannedCall planned(int sample, const TestNumbers& of) {
       PlannedCall{.sample = 70, .call = TestCall::reports, .beside = -of.huge},
       PlannedCall{71, TestCall::starts, 0, of.largest, -of.huge},
       PlannedCall{72, TestCall::reports, bad_y, 4, of.huge},
-      PlannedCall{73, TestCall::update, bad_y, 4},
+      PlannedCall{73, TestCall::update, bad_y, 4, of.huge},
       // The u that is kept leads beyond, too.
       PlannedCall{74, TestCall::resets, 0, of.largest, of.step},
       PlannedCall{.sample = 75, .call = TestCall::update, .beside = of.largest},
