@@ -8,6 +8,7 @@
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/approach_profile.hpp>
+#include <esokit/control/follow_profile.hpp>
 #include <esokit/control/smooth_profile.hpp>
 #include <esokit/control/time_proportioned.hpp>
 #include <esokit/observer/linear_eso.hpp>
@@ -81,6 +82,10 @@ void write_others() {
   profile.limits = {3.0f, 20.0f};
   write_as("profile", "`SmoothProfile<2, float>`", no_limits, {},
            SmoothProfile<2, float>::make(profile));
+  FollowProfileConfig<2, float> follow{.sample_time = 0.004f};
+  follow.limits = profile.limits;
+  write_as("follow", "`FollowProfile<2, float>`", no_limits, {},
+           FollowProfile<2, float>::make(follow));
   write_as("proportioned", "`TimeProportioned<float>`", "0\t1", {},
            TimeProportioned<float>::make({.off = 0.0f,
                                           .on = 1.0f,
