@@ -35,13 +35,9 @@ typedef struct {
   real motion[COUNT];
 } esokit_state;
 
-#if ESOKIT_SECOND
-/* At y with this speed at the next update: before the first one, and where an operator hands over;
-#else
-/* At y at the next update, at any speed: before the first one, and where an operator hands over;
-#endif
- * false, and nothing changes, if one is not finite, or so large that what follows is not. Before the
- * first one that is true the state has to be all zeros, as a static one is: at rest at zero. */
+/* At y with this speed (order 1: any) at the next update: before the first one, and where an operator
+ * hands over. False, and nothing changes, if one is not finite or too large. Before the first one
+ * that is true the state has to be all zeros, as a static one is: at rest at zero. */
 bool esokit_start(esokit_state *o, real y, real speed);
 /* One sample. The target: where to be now, and its derivatives, or zeros. False if it is not finite
  * or too large: then the last one goes on at its speed. */
