@@ -772,7 +772,6 @@ TEST(StructuredText, RefusesOtherC) {
         "= 1.0;\n  return true;\n}\nstatic double g(a_state *o, double y)\n{\n" +
             body + "}\n",
         "a");
-    translator.write_for("a_g(");
     return translator.error;
   };
   EXPECT_EQ(refusal("  return o->z + y;\n"), "");

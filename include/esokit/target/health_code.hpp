@@ -100,49 +100,44 @@ template <int Size, PlainScalar S, detail::WatchedController Controller>
 requires std::same_as<S, typename Controller::scalar_type> Expected<std::string, Error<S>>
 to_structured_text(const HealthMonitor<Size, S>& monitor, const Controller& controller,
                    const CodeOptions& options = {.name = "health"}) {
-  const auto code = to_c(monitor, controller, options);
-  if (!code) return code.error();
-  const auto new_names = detail::new_names_in_block<S>(
-      options, [&](const CodeOptions& as) { return to_structured_text(monitor, controller, as); });
-  if (!new_names) return new_names.error();
-  detail::StBlock block(*code, options, sizeof(S) == sizeof(float), "_clear");
-  block.own("sample : $name_sample");
-  block.own("flags : UDINT");
-  block.body = "IF clears THEN\n  done := $name_clear(o := o);\nEND_IF;\n";
-  const auto of_sample = [&](const char* name, const char* comment) {
-    block.input(std::string(name) + " : $real", comment);
-    block.body += std::string("sample.") + name + " := " + name + ";\n";
+  const auto add = [](detail::StBlock& block) {
+    block.own("sample : $name_sample");
+    block.own("flags : UDINT");
+    block.body = "IF clears THEN\n  done := $name_clear(o := o);\nEND_IF;\n";
+    const auto of_sample = [&](const char* name, const char* comment) {
+      block.input(std::string(name) + " : $real", comment);
+      block.body += std::string("sample.") + name + " := " + name + ";\n";
+    };
+    of_sample("innovation", "output of the controller's block, written with `watched`");
+    of_sample("asked", "such an output");
+    of_sample("held", "its u");
+    of_sample("applied", "such an output");
+    of_sample("measured", "y, as given to the controller's block");
+    of_sample("estimate", "its e0");
+    of_sample("disturbance", ("its e" + std::to_string(Controller::order)).c_str());
+    block.input("missed : UINT", "such an output");
+    block.input("its_status : UINT", "its status");
+    block.input("mode : UINT", "its mode");
+    block.input("clears : BOOL", "TRUE: forgets all before");
+    block.body +=
+        "sample.missed := UINT_TO_UDINT(missed);\nsample.status := UINT_TO_UDINT(its_status);\n"
+        "sample.runs := mode = 0;\ndone := $name_look(o := o, sample := sample);\n"
+        "flags := $name_diagnose(o := o);\nfault := UDINT_TO_UINT(flags);\n";
+    block.output(
+        "fault : UINT",
+        "0: none, 1: the sign of b0 is wrong, 2: b0 is several times too small, 3: more than "
+        "a tenth of y are rejected, 4: u is at a limit more than half of the time and y not on its "
+        "way, 6: the "
+        "innovation is three times that of the noise, 7: b0 is too large, or a load drives "
+        "u, 8: the sensor stands still");
+    for (const char* name : {"gain_ratio", "response", "saturated"}) {
+      block.output(std::string(name) + " : $real", "see HealthMonitor");
+      block.body += std::string(name) + " := o." + name + ";\n";
+    }
   };
-  of_sample("innovation", "output of the controller's block, written with `watched`");
-  of_sample("asked", "such an output");
-  of_sample("held", "its u");
-  of_sample("applied", "such an output");
-  of_sample("measured", "y, as given to the controller's block");
-  of_sample("estimate", "its e0");
-  of_sample("disturbance", ("its e" + std::to_string(Controller::order)).c_str());
-  block.input("missed : UINT", "such an output");
-  block.input("its_status : UINT", "its status");
-  block.input("mode : UINT", "its mode");
-  block.input("clears : BOOL", "TRUE: forgets all before");
-  block.body +=
-      "sample.missed := UINT_TO_UDINT(missed);\nsample.status := UINT_TO_UDINT(its_status);\n"
-      "sample.runs := mode = 0;\ndone := $name_look(o := o, sample := sample);\n"
-      "flags := $name_diagnose(o := o);\nfault := UDINT_TO_UINT(flags);\n";
-  block.output(
-      "fault : UINT",
-      "0: none, 1: the sign of b0 is wrong, 2: b0 is several times too small, 3: more than "
-      "a tenth of y are rejected, 4: u is at a limit more than half of the time and y not on its "
-      "way, 6: the "
-      "innovation is three times that of the noise, 7: b0 is too large, or a load drives "
-      "u, 8: the sensor stands still");
-  for (const char* name : {"gain_ratio", "response", "saturated"}) {
-    block.output(std::string(name) + " : $real", "see HealthMonitor");
-    block.body += std::string(name) + " := o." + name + ";\n";
-  }
-  const detail::StructuredText all = block.text(
-      "(* Written by esokit from a finished monitor; do not edit.\n$COMMENT   FUNCTION_BLOCK $name "
-      "is at the end: call it after each call of the controller. *)\n\n");
-  return all.template expected<S>(all.text);
+  return detail::block_of<S>(
+      options, [&](const CodeOptions& as) { return to_c(monitor, controller, as); }, "_clear",
+      "monitor", "after each call of the controller", add);
 }
 
 }  // namespace esokit

@@ -59,16 +59,6 @@ inline void put_motion(StBlock& block, int order) {
   }
 }
 
-/// The block of a profile. @param T its sample time
-template <PlainScalar S>
-Expected<std::string, Error<S>> block_of_profile(StBlock& block, S T) {
-  const StructuredText all = block.text(
-      "(* Written by esokit from a finished profile; do not edit.\n$COMMENT   FUNCTION_BLOCK $name "
-      "is at the end: call it once in each T = " +
-      ListWriter(c_language, false).number(static_cast<double>(T)) + " s. *)\n\n");
-  return all.template expected<S>(all.text);
-}
-
 /// What the self-test of a profile does at a sample.
 struct ProfileCall {
   double target;
@@ -174,22 +164,20 @@ Expected<CCode, Error<S>> to_c(const SmoothProfile<Order, S>& profile,
 template <int Order, PlainScalar S>
 Expected<std::string, Error<S>> to_structured_text(const SmoothProfile<Order, S>& profile,
                                                    const CodeOptions& options = {}) {
-  const auto code = to_c(profile, options);
-  if (!code) return code.error();
-  const auto new_names = detail::new_names_in_block<S>(
-      options, [&](const CodeOptions& as) { return to_structured_text(profile, as); });
-  if (!new_names) return new_names.error();
-  detail::StBlock block(*code, options, sizeof(S) == sizeof(float), "_init");
-  block.input("target : $real", "of the next move, or where it rests");
-  block.input("resets : BOOL", "TRUE: is at rest at target");
-  block.output("good : BOOL", "FALSE: target is not finite or too far");
-  block.output("moves : BOOL");
-  block.body =
-      "IF resets THEN\n  good := $name_reset(o := o, value := target);\nELSE\n"
-      "  good := $name_update(o := o, target := target);\nEND_IF;\n"
-      "moves := $name_moves(o := o);\n";
-  detail::put_motion(block, Order);
-  return detail::block_of_profile(block, detail::RecordAccess::profile(profile).sample_time);
+  const auto add = [](detail::StBlock& block) {
+    block.input("target : $real", "of the next move, or where it rests");
+    block.input("resets : BOOL", "TRUE: is at rest at target");
+    block.output("good : BOOL", "FALSE: target is not finite or too far");
+    block.output("moves : BOOL");
+    block.body =
+        "IF resets THEN\n  good := $name_reset(o := o, value := target);\nELSE\n"
+        "  good := $name_update(o := o, target := target);\nEND_IF;\n"
+        "moves := $name_moves(o := o);\n";
+    detail::put_motion(block, Order);
+  };
+  return detail::block_of<S>(
+      options, [&](const CodeOptions& as) { return to_c(profile, as); }, "_init", "profile",
+      detail::once_in_each(detail::RecordAccess::profile(profile).sample_time), add);
 }
 
 /// A profile towards any target as C99: `name_start` at rest at y under u, then `name_update` once
@@ -251,25 +239,23 @@ Expected<CCode, Error<S>> to_c(const ApproachProfile<Order, Capacity, S>& profil
 template <int Order, int Capacity, PlainScalar S>
 Expected<std::string, Error<S>> to_structured_text(
     const ApproachProfile<Order, Capacity, S>& profile, const CodeOptions& options = {}) {
-  const auto code = to_c(profile, options);
-  if (!code) return code.error();
-  const auto new_names = detail::new_names_in_block<S>(
-      options, [&](const CodeOptions& as) { return to_structured_text(profile, as); });
-  if (!new_names) return new_names.error();
-  detail::StBlock block(*code, options, sizeof(S) == sizeof(float), "_init");
-  block.input("target : $real", "where to go; it may change at any time");
-  block.input("y : $real", "if starts");
-  block.input("u_held : $real", "if starts");
-  block.input("starts : BOOL", "TRUE: the machine rests at y under u_held, before the sample");
-  block.output("started : BOOL", "FALSE: not finite or too large, nothing changed");
-  block.output("good : BOOL", "FALSE: target is not finite or too large, the last one counts");
-  block.output("feed : $real", "to be added to u of the law");
-  block.body =
-      "started := FALSE;\nIF starts THEN\n  started := $name_start(o := o, y := y, u := u_held);\n"
-      "END_IF;\ngood := $name_update(o := o, target := target);\nfeed := $name_feed(o := o);\n";
-  detail::put_motion(block, Order);
-  return detail::block_of_profile(block,
-                                  detail::RecordAccess::approach(profile).config.sample_time);
+  const auto add = [](detail::StBlock& block) {
+    block.input("target : $real", "where to go; it may change at any time");
+    block.input("y : $real", "if starts");
+    block.input("u_held : $real", "if starts");
+    block.input("starts : BOOL", "TRUE: the machine rests at y under u_held, before the sample");
+    block.output("started : BOOL", "FALSE: not finite or too large, nothing changed");
+    block.output("good : BOOL", "FALSE: target is not finite or too large, the last one counts");
+    block.output("feed : $real", "to be added to u of the law");
+    block.body =
+        "started := FALSE;\nIF starts THEN\n  started := $name_start(o := o, y := y, u := "
+        "u_held);\n"
+        "END_IF;\ngood := $name_update(o := o, target := target);\nfeed := $name_feed(o := o);\n";
+    detail::put_motion(block, Order);
+  };
+  return detail::block_of<S>(
+      options, [&](const CodeOptions& as) { return to_c(profile, as); }, "_init", "profile",
+      detail::once_in_each(detail::RecordAccess::approach(profile).config.sample_time), add);
 }
 
 namespace detail {

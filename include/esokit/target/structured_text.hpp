@@ -65,6 +65,33 @@ class StBlock {
 
 StructuredText structured_text(const RecordedDesign& design);
 
+/// The block of what is neither controller nor observer. @param to_c of options its C
+/// @param begins see StBlock @param what it was, and when it is called: for its head
+/// @param add gives a block its inputs, outputs and body
+template <class S, class ToC, class Add>
+Expected<std::string, Error<S>> block_of(const CodeOptions& options, const ToC& to_c,
+                                         const char* begins, const std::string& what,
+                                         const std::string& when, const Add& add) {
+  const auto code = to_c(options);
+  if (!code) return code.error();
+  const auto new_names = new_names_in_block<S>(options, [&](const CodeOptions& as) {
+    return block_of<S>(as, to_c, begins, what, when, add);
+  });
+  if (!new_names) return new_names.error();
+  StBlock block(*code, options, sizeof(S) == sizeof(float), begins);
+  add(block);
+  const StructuredText all =
+      block.text("(* Written by esokit from a finished " + what +
+                 "; do not edit.\n$COMMENT   FUNCTION_BLOCK $name is at the end: call it " + when +
+                 ". *)\n\n");
+  return all.template expected<S>(all.text);
+}
+/// @param T its sample time @return when such a block is called
+template <class S>
+std::string once_in_each(S T) {
+  return "once in each T = " + ListWriter(c_language, false).number(static_cast<double>(T)) + " s";
+}
+
 }  // namespace detail
 
 /// The controller or observer as a function block in Structured Text (IEC 61131-3, second edition:

@@ -75,26 +75,18 @@ Expected<CCode, Error<S>> to_c(const TimeProportioned<S>& output, const CodeOpti
 template <PlainScalar S>
 Expected<std::string, Error<S>> to_structured_text(const TimeProportioned<S>& output,
                                                    const CodeOptions& options = {}) {
-  const auto code = to_c(output, options);
-  if (!code) return code.error();
-  const auto new_names = detail::new_names_in_block<S>(
-      options, [&](const CodeOptions& as) { return to_structured_text(output, as); });
-  if (!new_names) return new_names.error();
-  detail::StBlock block(*code, options, sizeof(S) == sizeof(float), "_reset");
-  block.input("u : $real", "counts at the start of a window");
-  block.output("is_on : BOOL");
-  block.output("applied : $real", "the mean of this window");
-  block.output("begins : BOOL", "TRUE: the next call begins a window");
-  block.body =
-      "is_on := $name_update(o := o, u := u);\napplied := $name_applied(o := o);\n"
-      "begins := $name_begins(o := o);\n";
-  const detail::StructuredText all = block.text(
-      "(* Written by esokit from a finished output; do not edit.\n$COMMENT   FUNCTION_BLOCK $name "
-      "is at the end: call it once in each T = " +
-      detail::ListWriter(detail::c_language, false)
-          .number(static_cast<double>(detail::RecordAccess::proportioned(output).sample_time)) +
-      " s. *)\n\n");
-  return all.template expected<S>(all.text);
+  const auto add = [](detail::StBlock& block) {
+    block.input("u : $real", "counts at the start of a window");
+    block.output("is_on : BOOL");
+    block.output("applied : $real", "the mean of this window");
+    block.output("begins : BOOL", "TRUE: the next call begins a window");
+    block.body =
+        "is_on := $name_update(o := o, u := u);\napplied := $name_applied(o := o);\n"
+        "begins := $name_begins(o := o);\n";
+  };
+  return detail::block_of<S>(
+      options, [&](const CodeOptions& as) { return to_c(output, as); }, "_reset", "output",
+      detail::once_in_each(detail::RecordAccess::proportioned(output).sample_time), add);
 }
 
 }  // namespace esokit

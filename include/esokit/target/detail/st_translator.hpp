@@ -2,6 +2,7 @@
 /// The C that esokit writes, function by function as Structured Text.
 #pragma once
 
+#include <cstddef>
 #include <deque>
 #include <esokit/core/detail/compiled.hpp>
 #include <esokit/target/detail/list_writer.hpp>
@@ -9,6 +10,15 @@
 #include <vector>
 
 namespace esokit::detail {
+
+/// The one of that name, or null.
+template <class All>
+auto found(All& all, const std::string& name) -> decltype(&all[0]) {
+  for (auto& one : all) {
+    if (one.name == name) return &one;
+  }
+  return nullptr;
+}
 
 class StParser;
 
@@ -26,12 +36,11 @@ class StTranslator {
   /// @param text header and source, one after the other @param name before each function and type
   StTranslator(const std::string& text, const std::string& name);
 
-  [[nodiscard]] bool has(const std::string& name) const { return found(name) != nullptr; }
-
-  /// Whatever `body` calls is written, with all that these call.
-  void write_for(const std::string& body);
-  /// The types, then the functions that are needed.
-  [[nodiscard]] std::string text() const;
+  [[nodiscard]] bool has(const std::string& name) const {
+    return found(functions_, name) != nullptr;
+  }
+  /// `body`, behind the types and all functions that it needs.
+  [[nodiscard]] std::string text_for(const std::string& body) const;
   /// A function that gives the settings of the C to a variable. @param as behind its name
   [[nodiscard]] std::string settings(const std::string& as) const;
 
@@ -43,25 +52,17 @@ class StTranslator {
   struct Variable {
     std::string name{}, type{};
     std::vector<int> sizes{};  ///< of an array
-    bool by_reference = false;
     bool is_constant = false;
+    std::string part = "VAR";  ///< or VAR_IN_OUT, VAR_INPUT
     std::string initial{}, comment{};
   };
+  /// Or a struct, whose variables are its fields.
   struct Function {
     std::string name{}, type{}, text{};
-    std::vector<Variable> parameters{};
-    bool is_needed = false;
+    std::vector<Variable> variables{};
+    std::size_t parameters = 0;  ///< so many of them, the first
   };
-
-  [[nodiscard]] const Function* found(const std::string& name) const {
-    for (const Function& one : functions_) {
-      if (one.name == name) return &one;
-    }
-    return nullptr;
-  }
-
-  std::string name_;
-  std::string types_{};
+  std::string name_, types_{};
   std::string settings_{};            ///< the statements that give them
   std::deque<Function> functions_{};  ///< what is called before what calls it
 };

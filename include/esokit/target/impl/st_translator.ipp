@@ -4,13 +4,12 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdlib>
+#include <deque>
 #include <esokit/target/detail/list_writer.hpp>
 #include <esokit/target/detail/st_translator.hpp>
 #include <esokit/target/detail/written_names.hpp>
 #include <map>
-#include <set>
 #include <string>
-#include <tuple>
 #include <vector>
 
 namespace esokit::detail {
@@ -25,20 +24,18 @@ class StParser {
     tokens_.resize(tokens_.size() + 3);  // at_ never goes beyond the first
     while (at_ + 3 < tokens_.size()) item();
     std::string structs;
-    for (const std::string& each : order_of_structs_) {
-      structs += "TYPE " + each + " :\n  STRUCT\n";
-      for (const Variable& field : structs_[each]) structs += "    " + declared(field) + "\n";
+    for (const Function& each : structs_) {
+      structs += "TYPE " + each.name + " :\n  STRUCT\n";
+      for (const Variable& field : each.variables) structs += "    " + declared(field) + "\n";
       structs += "  END_STRUCT;\nEND_TYPE\n\n";
     }
-    for (const int size : arrays_) {
-      to_.types_ += "TYPE " + to_.name_ + "_numbers_" + std::to_string(size) + " : ARRAY[0.." +
-                    std::to_string(size - 1) + "] OF " + real_ + "; END_TYPE\n\n";
-    }
+    for (const auto& [size, type] : arrays_) to_.types_ += type;
     to_.types_ += structs;
   }
 
  private:
   using Variable = StTranslator::Variable;
+  using Function = StTranslator::Function;
   /// A word or mark, and the comments before it and behind it on its line.
   struct Token {
     std::string text{}, before{}, behind{};
@@ -72,12 +69,13 @@ class StParser {
         (same_line ? tokens_.back().behind : before) += "(*" + comment + "*)";
       } else if (std::isspace(static_cast<unsigned char>(text[i])) == 0) {
         end = i + length_at(text, i);
-        std::string token = text.substr(i, end - i);
-        if (const auto flag = flags_.find(token); flag != flags_.end()) token = flag->second;
-        if (const auto found = constants_.find(token); found != constants_.end()) {
-          split(found->second);
-        } else {
+        const std::string word = text.substr(i, end - i);
+        const auto constant = constants_.find(word);
+        const std::string token = constant == constants_.end() ? word : constant->second;
+        if (token == word || token.find(' ') != std::string::npos) {
           tokens_.push_back({token, before});
+        } else {
+          split(token);
         }
         before.clear();
         same_line = true;
@@ -101,12 +99,11 @@ class StParser {
     const std::size_t at = line.find(' ');
     if (at == std::string::npos) return;
     const std::string name = line.substr(0, at), prefix = begin_of_constants(to_.name_) + "_";
-    const std::string value = line.substr(at + 1, line.find(' ', at + 1) - at - 1);
+    std::string value = line.substr(at + 1, line.find(' ', at + 1) - at - 1);
     if (name.compare(0, prefix.size(), prefix) == 0) {
-      flags_[name] = StTranslator::number(value) + " (* " + name.substr(prefix.size()) + " *)";
-    } else {
-      constants_[name] = value;
+      value = StTranslator::number(value) + " (* " + name.substr(prefix.size()) + " *)";
     }
+    constants_[name] = value;
   }
 
   [[nodiscard]] const std::string& peek(int ahead = 0) const {
@@ -139,7 +136,7 @@ class StParser {
     if (word == "bool" || word == "void") return "BOOL";
     if (word == "double" || word == "float") return word == "float" ? "REAL" : "LREAL";
     if (counts.find(" " + word + " ") != std::string::npos) return "UDINT";
-    return structs_.count(of_this(word)) != 0 ? of_this(word) : "";
+    return found(structs_, of_this(word)) != nullptr ? of_this(word) : "";
   }
   /// `const double *name[2]`
   Variable declarator() {
@@ -149,7 +146,7 @@ class StParser {
     if (one.type.empty()) fail("'" + peek() + "' is no type");
     (void)next();
     if (real_.empty() && one.type.find("REAL") != std::string::npos) real_ = one.type;
-    one.by_reference = take("*");
+    if (take("*")) one.part = "VAR_IN_OUT";
     one.name = next();
     for (; take("["); expect("]")) one.sizes.push_back(std::atoi(next().c_str()));
     return one;
@@ -159,22 +156,17 @@ class StParser {
     return is_word_of_structured_text(word) ? "the_" + word : word;
   }
   std::string declared(const Variable& one) {
+    const auto range = [](int size) { return "0.." + std::to_string(size - 1); };
     std::string text = one.type;
-    if (one.sizes.size() == 1 && one.initial.empty() && text == real_) {
-      arrays_.insert(one.sizes[0]);
-      text = to_.name_ + "_numbers_" + std::to_string(one.sizes[0]);
-    } else if (!one.sizes.empty()) {
-      const auto range = [](int size) { return "0.." + std::to_string(size - 1); };
-      text = "ARRAY[" + listed(one.sizes, range) + "] OF " + text;
+    if (!one.sizes.empty()) text = "ARRAY[" + listed(one.sizes, range) + "] OF " + text;
+    if (!one.initial.empty()) {
+      text += " := [" + one.initial + "]";
+    } else if (one.sizes.size() == 1 && one.type == real_) {
+      const std::string name = to_.name_ + "_numbers_" + std::to_string(one.sizes[0]);
+      arrays_[one.sizes[0]] = "TYPE " + name + " : " + text + "; END_TYPE\n\n";
+      text = name;
     }
-    if (!one.initial.empty()) text += " := [" + one.initial + "]";
     return name_of(one.name) + " : " + text + ";" + (one.comment.empty() ? "" : " " + one.comment);
-  }
-  static const Variable* found(const std::vector<Variable>& all, const std::string& name) {
-    for (const Variable& one : all) {
-      if (one.name == name) return &one;
-    }
-    return nullptr;
   }
 
   // ---- The file: types, tables, functions.
@@ -182,7 +174,6 @@ class StParser {
   void item() {
     const std::string comment = tokens_[at_].before;
     function_ = {};
-    locals_.clear();
     if (take("extern")) return skip_behind(";");
     if (take("typedef")) return structure();
     (void)take("static");
@@ -194,16 +185,16 @@ class StParser {
   }
 
   void structure() {
+    Function one;
     expect("struct");
     expect("{");
-    std::vector<Variable> fields;
     while (to_.error.empty() && !take("}")) {
-      fields.push_back(declarator());
+      one.variables.push_back(declarator());
       expect(";");
-      fields.back().comment = tokens_[at_ - 1].behind;
+      one.variables.back().comment = tokens_[at_ - 1].behind;
     }
-    order_of_structs_.push_back(of_this(next()));
-    structs_[order_of_structs_.back()] = fields;
+    one.name = of_this(next());
+    structs_.push_back(one);
     expect(";");
   }
 
@@ -215,15 +206,19 @@ class StParser {
       numbers.push_back((tokens_[at_ - 1].text == "-" ? "-" : "") + StTranslator::number(peek()));
     }
     expect(";");
-    if (structs_.count(one.type) != 0) return settings(one, numbers);
+    const Function* type = found(structs_, one.type);
+    if (type != nullptr) return settings(*type, one.name, numbers);
     one.initial = listed(numbers, [](const std::string& each) { return each; });
-    const bool is_local = !function_.name.empty() && (locals_.empty() || locals_[0].type != state_);
-    (is_local ? locals_ : structs_[state_]).push_back(one);
+    const auto& first = function_.variables;
+    const bool is_local = !function_.name.empty() && (first.empty() || first[0].type != state_);
+    Function* state = is_local ? nullptr : found(structs_, state_);
+    (state == nullptr ? function_ : *state).variables.push_back(one);
   }
 
-  void settings(const Variable& set, const std::vector<std::string>& numbers) {
+  void settings(const Function& type, const std::string& name,
+                const std::vector<std::string>& numbers) {
     std::size_t next = 0;
-    for (const Variable& field : structs_[set.type]) {
+    for (const Variable& field : type.variables) {
       const int columns = field.sizes.empty() ? 1 : field.sizes.back();
       const int rows = field.sizes.size() > 1 ? field.sizes[0] : 1;
       for (int i = 0; i < rows * columns && next < numbers.size(); ++i) {
@@ -233,22 +228,22 @@ class StParser {
                          " := " + numbers[next++] + ";\n";
       }
     }
-    set_ = set.name;
+    set_ = name;
     to_.functions_.push_back({to_.name_ + "_set_first", "", to_.settings("first")});
   }
 
   void function(const std::string& comment) {
     expect("(");
-    while (to_.error.empty() && !take(")")) {
+    for (; to_.error.empty() && !take(")"); ++function_.parameters) {
       Variable one = declarator();
       // Another struct that is read is given by its value.
-      const bool whole = one.by_reference && one.is_constant && one.type != state_;
-      one.by_reference = (one.by_reference && !whole) || !one.sizes.empty();
-      locals_.push_back(one);
+      const bool whole = one.is_constant && one.type != state_;
+      const bool by_reference = !one.sizes.empty() || (one.part == "VAR_IN_OUT" && !whole);
+      one.part = by_reference ? "VAR_IN_OUT" : "VAR_INPUT";
+      function_.variables.push_back(one);
       (void)take(",");
     }
     if (take(";")) return;
-    function_.parameters = locals_;
     expect("{");
     lines_.clear();
     temporaries_ = 0;
@@ -259,31 +254,25 @@ class StParser {
     } else {
       block();
     }
-    function_.text = comment + (comment.empty() ? "" : "\n") + whole_text();
+    if (!lines_.empty() && lines_.back() == "  RETURN;") lines_.pop_back();
+    std::string text = comment + (comment.empty() ? "" : "\n");
+    text += "FUNCTION " + function_.name + " : " + function_.type + "\n";
+    for (const std::string part : {"VAR_IN_OUT", "VAR_INPUT", "VAR"}) {
+      std::string inside;
+      for (const Variable& one : function_.variables) {
+        if (one.part == part) inside += "  " + declared(one) + "\n";
+      }
+      if (!inside.empty()) text += part + "\n" + inside + "END_VAR\n";
+    }
+    for (const std::string& each : lines_) text += each + "\n";
+    function_.text = text + "END_FUNCTION\n\n";
     if (to_.has(function_.name)) fail("a second one");
     to_.functions_.push_back(function_);
   }
 
-  /// Of the function at hand.
-  std::string whole_text() {
-    if (!lines_.empty() && lines_.back() == "  RETURN;") lines_.pop_back();
-    std::string parts[3], text = "FUNCTION " + function_.name + " : " + function_.type + "\n";
-    for (std::size_t i = 0; i < locals_.size(); ++i) {
-      parts[i >= function_.parameters.size() ? 2
-            : locals_[i].by_reference        ? 0
-                                             : 1] += "  " + declared(locals_[i]) + "\n";
-    }
-    static const char* const begins[] = {"VAR_IN_OUT\n", "VAR_INPUT\n", "VAR\n"};
-    for (std::size_t i = 0; i < 3; ++i) {
-      if (!parts[i].empty()) text += begins[i] + parts[i] + "END_VAR\n";
-    }
-    for (const std::string& each : lines_) text += each + "\n";
-    return text + "END_FUNCTION\n\n";
-  }
-
   void add_local(const Variable& one) {
-    const Variable* other = found(locals_, one.name);
-    if (other == nullptr) return locals_.push_back(one);
+    const Variable* other = found(function_.variables, one.name);
+    if (other == nullptr) return function_.variables.push_back(one);
     if (other->type != one.type || other->sizes != one.sizes) fail("two " + one.name);
   }
 
@@ -322,7 +311,11 @@ class StParser {
       line("RETURN;");
     } else {
       if (take("(")) skip_behind(")");  // void
-      if (peek() == "memset") return clear();
+      if (take("memset")) {             // of the state: as the variables of a function begin
+        add_local({"nothing", state_});
+        line("o := nothing;");
+        return skip_behind(";");
+      }
       (void)take("*");
       const Value left = postfix();
       if (take("=")) {
@@ -353,17 +346,10 @@ class StParser {
     line(name + " := " + value.text + ";");
   }
 
-  /// memset of the state: as the variables of a function begin.
-  void clear() {
-    add_local({"nothing", state_});
-    line("o := nothing;");
-    skip_behind(";");
-  }
-
   void declaration() {
     const bool is_table = take("static");
     const Variable one = declarator();
-    if (one.by_reference) fail("a pointer " + one.name);
+    if (one.part != "VAR") fail("a pointer " + one.name);
     if (is_table) return table(one);
     add_local(one);
     if (take("=")) assign({name_of(one.name), one.type}, expression());
@@ -380,9 +366,8 @@ class StParser {
 
   void condition(const std::string& begin) {
     expect("(");
-    const std::string holds = begin == "IF " ? expression().text : alone();
+    line(begin + (begin == "IF " ? expression().text : alone()) + " THEN");
     expect(")");
-    line(begin + holds + " THEN");
     body();
     if (take("else")) {
       if (take("if")) return condition("ELSIF ");
@@ -415,7 +400,7 @@ class StParser {
   // ---- Expressions.
 
   Value expression() {
-    const Value condition = binary(0);
+    const Value condition = binary();
     if (!take("?")) return condition;
     const Value yes = expression();
     expect(":");
@@ -425,32 +410,28 @@ class StParser {
     return {"SEL(" + argument(condition) + ", " + choice + ")", yes.type, condition.lazy};
   }
 
-  Value binary(int least) {
-    // Levels: the higher, the nearer the operands; 0, 1: of conditions; 2, 3: of bits. Last: of
-    // which type alone.
-    using Operator = std::tuple<int, const char*, const char*>;
-    static const std::map<std::string, Operator> operators{
-        {"||", {0, "OR", "BOOL"}},  {"&&", {1, "AND", "BOOL"}}, {"|", {2, "OR", "UDINT"}},
-        {"&", {3, "AND", "UDINT"}}, {"==", {4, "=", ""}},       {"!=", {4, "<>", ""}},
-        {"<", {5, "<", ""}},        {">", {5, ">", ""}},        {"<=", {5, "<=", ""}},
-        {">=", {5, ">=", ""}},      {"+", {6, "+", ""}},        {"-", {6, "-", ""}},
-        {"*", {7, "*", ""}},        {"/", {7, "/", ""}},        {"%", {7, "MOD", "UDINT"}}};
+  /// Operands of one operator: where two meet the C has brackets.
+  Value binary() {
+    static const std::map<std::string, std::string> words{
+        {"||", "OR"}, {"&&", "AND"}, {"|", "OR"}, {"&", "AND"}, {"==", "="},
+        {"!=", "<>"}, {"<", "<"},    {">", ">"},  {"<=", "<="}, {">=", ">="},
+        {"+", "+"},   {"-", "-"},    {"*", "*"},  {"/", "/"},   {"%", "MOD"}};
     Value left = unary();
-    for (auto one = operators.find(peek());
-         one != operators.end() && std::get<0>(one->second) >= least;
-         one = operators.find(peek())) {
-      const auto& [level, word, only] = one->second;
-      const bool is_difference = next() == "-" && left.type == "UDINT";
-      const Value right = binary(level + 1);
-      if (left.type != right.type || (*only != '\0' && left.type != only) ||
-          (level < 2 && right.lazy)) {
-        fail("'" + left.text + " " + word + " " + right.text + "' of " + left.type);
+    const std::string sign = peek();
+    const auto known = words.find(sign);
+    while (known != words.end() && take(sign)) {
+      const std::string word = " " + known->second + " ";
+      const bool joins = sign == "||" || sign == "&&", of_bits = sign == "|" || sign == "&";
+      const std::string of = joins ? "BOOL" : of_bits || sign == "%" ? "UDINT" : left.type;
+      const Value right = unary();
+      if (left.type != of || right.type != of || (joins && right.lazy)) {
+        fail("'" + left.text + word + right.text + "' of " + left.type);
       }
-      const bool is_lazy = left.lazy || right.lazy || is_difference, of_bits = level / 2 == 1;
-      left.text = of_bits ? "DWORD_TO_UDINT(UDINT_TO_DWORD(" + argument(left) + ") " + word +
-                                " UDINT_TO_DWORD(" + argument(right) + "))"
-                          : left.operand() + " " + word + " " + right.operand();
-      left = {left.text, level < 6 && !of_bits ? "BOOL" : left.type, is_lazy, of_bits};
+      left.text = of_bits ? "DWORD_TO_UDINT(UDINT_TO_DWORD(" + argument(left) + ")" + word +
+                                "UDINT_TO_DWORD(" + argument(right) + "))"
+                          : left.operand() + word + right.operand();
+      left.lazy = left.lazy || right.lazy || (sign == "-" && of == "UDINT");
+      left = {left.text, word.find_first_of("=<>") < word.size() ? "BOOL" : of, left.lazy, of_bits};
     }
     return left;
   }
@@ -478,16 +459,15 @@ class StParser {
     Value value = primary();
     while (to_.error.empty()) {
       if (take("->") || take(".")) {
-        const Variable* one = found(structs_[value.type], peek());
+        const Function* type = found(structs_, value.type);
+        const Variable* one = type == nullptr ? nullptr : found(type->variables, peek());
         if (one == nullptr) return fail("no '" + peek() + "' in '" + value.text + "'"), value;
         (void)next();
         value = {value.text + "." + name_of(one->name), one->type, value.lazy};
       } else if (take("[")) {
-        const bool goes_on = value.text.back() == ']';
-        value.text =
-            goes_on ? value.text.substr(0, value.text.size() - 1) + ", " : value.text + "[";
-        value = {value.text + expression().text + "]", value.type, true};
-        expect("]");
+        std::string places = expression().text;
+        for (expect("]"); take("["); expect("]")) places += ", " + expression().text;
+        value = {value.text + "[" + places + "]", value.type, true};
       } else {
         break;
       }
@@ -511,8 +491,9 @@ class StParser {
     }
     if (take("(")) return call(word);
     if (word == set_) return {set_, to_.name_ + "_settings"};
-    if (const Variable* one = found(locals_, word)) return {name_of(word), one->type};
-    const Variable* one = found(structs_[state_], word);
+    if (const Variable* one = found(function_.variables, word)) return {name_of(word), one->type};
+    const Function* state = found(structs_, state_);
+    const Variable* one = state == nullptr ? nullptr : found(state->variables, word);
     if (one != nullptr && !one->initial.empty()) return {"o." + name_of(word), one->type};
     fail("'" + word + "' is not known");
     return {};
@@ -539,24 +520,25 @@ class StParser {
     const bool rounds = stem == "round" || stem == "ceil";
     const auto of_c = known.find(stem);
     const std::string name = rounds ? rounding(stem) : of_this(word);
-    const bool is_own = to_.has(name);
-    if (!is_own && of_c == known.end()) return fail("'" + word + "' is not known"), Value{};
-    const StTranslator::Function library{"", real_, "", {{"", real_}, {"", real_}}};
-    const StTranslator::Function& function = is_own ? *to_.found(name) : library;
+    const Function library{"", real_, "", {{"", real_}, {"", real_}}, 2};
+    const Function* own = found(to_.functions_, name);
+    if (own == nullptr && of_c == known.end()) return fail("'" + word + "' is not known"), Value{};
+    const Function& function = own != nullptr ? *own : library;
     Value value{"", function.type};
     std::size_t i = 0;
-    for (; !take(")") && i < function.parameters.size(); ++i) {
-      const Variable& one = function.parameters[i];
+    for (; !take(")") && i < function.parameters; ++i) {
+      const Variable& one = function.variables[i];
+      const bool by_reference = one.part == "VAR_IN_OUT";
       const Value given = expression();
       if (one.type != given.type) fail("another type of " + one.name + " of " + word);
-      value.text += (i > 0 ? ", " : "") + (is_own ? name_of(one.name) + " := " : "");
+      value.text += (i > 0 ? ", " : "") + (own != nullptr ? name_of(one.name) + " := " : "");
       value.text += argument(given);
-      value.lazy = value.lazy || given.lazy || (one.by_reference && !one.is_constant);
-      value.by_reference = value.by_reference || one.by_reference;
+      value.lazy = value.lazy || given.lazy || (by_reference && !one.is_constant);
+      value.by_reference = value.by_reference || by_reference;
       (void)take(",");
     }
-    if (!is_own) return {filled(of_c->second, {{"$x", value.text}}), real_, value.lazy};
-    if (i != function.parameters.size() || tokens_[at_ - 1].text != ")") fail("a call of " + word);
+    if (own == nullptr) return {filled(of_c->second, {{"$x", value.text}}), real_, value.lazy};
+    if (i != function.parameters || tokens_[at_ - 1].text != ")") fail("a call of " + word);
     value.text = name + "(" + value.text + ")";
     return value;
   }
@@ -580,7 +562,7 @@ class StParser {
          {"$REAL", real_},
          {"$W", real_ == "REAL" ? "8388608.0" : "4503599627370496.0"},
          {"$UP", stem == "ceil" ? "whole < size" : "size - whole >= 0.5"}});
-    to_.functions_.push_back({name, real_, text, {{"x", real_}}});
+    to_.functions_.push_back({name, real_, text, {{"x", real_}}, 1});
     return name;
   }
   /// An LREAL beyond what a REAL holds, which not each compiler takes: times a power of 2^126.
@@ -600,16 +582,13 @@ class StParser {
   std::string real_{};
   std::vector<Token> tokens_{};
   std::size_t at_ = 0;
-  std::map<std::string, std::string> flags_{};      ///< with the name of the design
-  std::map<std::string, std::string> constants_{};  ///< others
-  std::map<std::string, std::vector<Variable>> structs_{};
-  std::vector<std::string> order_of_structs_{};
-  std::set<int> arrays_{};  ///< sizes of arrays of numbers
-  std::string set_{};       ///< the name of the settings
+  std::map<std::string, std::string> constants_{};
+  std::deque<Function> structs_{};
+  std::map<int, std::string> arrays_{};  ///< types of arrays of numbers, by their size
+  std::string set_{};                    ///< the name of the settings
 
   // Of the function at hand.
-  StTranslator::Function function_{};
-  std::vector<Variable> locals_{};  ///< parameters first
+  Function function_{};
   std::vector<std::string> lines_{};
   std::string indent_ = "  ";
   int temporaries_ = 0;
@@ -620,18 +599,12 @@ ESOKIT_FUNCTION StTranslator::StTranslator(const std::string& text, const std::s
   StParser(*this).read(text);
 }
 
-ESOKIT_FUNCTION void StTranslator::write_for(const std::string& body) {
-  for (Function& one : functions_) {
-    if (one.is_needed || body.find(one.name + "(") == std::string::npos) continue;
-    one.is_needed = true;
-    write_for(one.text);
+ESOKIT_FUNCTION std::string StTranslator::text_for(const std::string& body) const {
+  std::string text = body;
+  for (auto one = functions_.rbegin(); one != functions_.rend(); ++one) {
+    if (text.find(one->name + "(") != std::string::npos) text = one->text + text;
   }
-}
-
-ESOKIT_FUNCTION std::string StTranslator::text() const {
-  std::string all = types_;
-  for (const Function& one : functions_) all += one.is_needed ? one.text : "";
-  return all;
+  return types_ + text;
 }
 
 ESOKIT_FUNCTION std::string StTranslator::settings(const std::string& as) const {

@@ -117,8 +117,7 @@ ESOKIT_FUNCTION StructuredText StBlock::text(const std::string& head) {
                  "END_VAR\nVAR\n  o : $name_state;\n" + own_ + "  done : BOOL;\nEND_VAR\n\n" +
                  first_ + body + "END_FUNCTION_BLOCK\n",
              words_);
-  translator.write_for(block);
-  return {filled(head, words_) + translator.text() + block, {}, translator.error};
+  return {filled(head, words_) + translator.text_for(block), {}, translator.error};
 }
 
 /// The block of a controller or an observer.
