@@ -19,9 +19,10 @@ namespace esokit::detail {
 
 /// Chooses scales and builds the lists.
 class FixedBuilder : public FixedRecord {
- protected:
+ public:
   using FixedRecord::FixedRecord;
 
+ protected:
   // ---- Building.
 
   struct Term {
@@ -51,7 +52,8 @@ class FixedBuilder : public FixedRecord {
     std::map<int, Value> values{};
     std::vector<Value> words{};
     std::vector<Value> rests{};
-    std::vector<int> narrow{};  ///< lines of 16 bits
+    std::vector<int> narrow{};         ///< lines of 16 bits
+    static constexpr int none = 1000;  ///< no scale
     std::size_t products = 0;
 
     [[nodiscard]] const Instruction& at(int i) const {
@@ -67,32 +69,33 @@ class FixedBuilder : public FixedRecord {
       int exponent = 0;
       return !forms.varies[static_cast<std::size_t>(i)] && is_short(forms.number(i), odd, exponent);
     }
-    void collect(int i, double by, bool inside, std::vector<Term>& terms, int open,
+    static void add(std::vector<Term>& terms, const Term& more) {
+      for (Term& term : terms) {
+        if (term.node != more.node) continue;
+        term.coefficient += more.coefficient;
+        term.varies = term.varies || more.varies;
+        return;
+      }
+      terms.push_back(more);
+    }
+    /// The terms of a sum. @param inside it, what has a name is a term
+    void collect(int i, double by, bool inside, std::vector<Term>& terms,
                  bool varies = false) const {
       const Instruction& one = at(i);
       if (forms.is_constant(i)) return;
-      if (one.operation == Operation::argument ||
-          (inside && kept[static_cast<std::size_t>(i)] && i != open)) {
-        for (Term& term : terms) {
-          if (term.node == i) {
-            term.coefficient += by;
-            term.varies = term.varies || varies;
-            return;
-          }
-        }
-        terms.push_back({by, i, varies});
+      if (one.operation == Operation::argument || (inside && kept[static_cast<std::size_t>(i)])) {
+        add(terms, {by, i, varies});
       } else if (one.operation == Operation::multiply) {
         const bool first = forms.is_constant(one.a);
-        collect(first ? one.b : one.a, by * forms.number(first ? one.a : one.b), true, terms, open,
+        collect(first ? one.b : one.a, by * forms.number(first ? one.a : one.b), true, terms,
                 varies || forms.varies[static_cast<std::size_t>(first ? one.a : one.b)]);
       } else if (one.operation == Operation::divide) {
-        collect(one.a, by / forms.number(one.b), true, terms, open,
+        collect(one.a, by / forms.number(one.b), true, terms,
                 varies || forms.varies[static_cast<std::size_t>(one.b)]);
       } else {
-        collect(one.a, one.operation == Operation::negate ? -by : by, true, terms, open, varies);
+        collect(one.a, one.operation == Operation::negate ? -by : by, true, terms, varies);
         if (is_sum(i)) {
-          collect(one.b, one.operation == Operation::subtract ? -by : by, true, terms, open,
-                  varies);
+          collect(one.b, one.operation == Operation::subtract ? -by : by, true, terms, varies);
         }
       }
     }
@@ -231,34 +234,24 @@ class FixedBuilder : public FixedRecord {
     }
 
     /// The coarsest scale among what is not an input and not multiplied; what may be finer else.
-    [[nodiscard]] int natural(const std::vector<Term>& terms, bool finest) {
-      int found = 1000;
+    /// @param root if given, the state whose scale it is, or -1: if the sum does not fit, it has to
+    ///        be coarser, so that nothing is shifted
+    [[nodiscard]] int natural(const std::vector<Term>& terms, bool finest, int* root = nullptr) {
+      int found = none;
       for (const Term& one : terms) {
         int odd = 0;
         int exponent = 0;
         if (input_of(one.node) != nullptr) continue;
         if (!is_short(one, odd, exponent)) continue;
         const int s = value(one.node).scale - exponent;
-        if (found == 1000 || (finest ? s > found : s < found)) found = s;
+        if (found != none && (finest ? s <= found : s >= found)) continue;
+        found = s;
+        if (root == nullptr) continue;
+        const bool is_argument = at(one.node).operation == Operation::argument;
+        *root =
+            is_argument ? of->state_of_argument(at(one.node).a) : of->root_of_[owners + one.node];
       }
       return found;
-    }
-
-    /// The state whose scale is that of the sum: if the sum does not fit, it is that of the state
-    /// that has to be coarser, so that nothing is shifted.
-    [[nodiscard]] int root(const std::vector<Term>& terms) {
-      const int scale = natural(terms, false);
-      for (const Term& one : terms) {
-        int odd = 0;
-        int exponent = 0;
-        if (input_of(one.node) != nullptr || !is_short(one, odd, exponent)) continue;
-        if (value(one.node).scale - exponent != scale) continue;
-        if (at(one.node).operation == Operation::argument) {
-          return of->state_of_argument(at(one.node).a);
-        }
-        return of->root_of_[owners + one.node];
-      }
-      return -1;
     }
 
     Value value(int node) {
@@ -276,21 +269,20 @@ class FixedBuilder : public FixedRecord {
         }
       } else {
         std::vector<Term> terms;
-        collect(node, 1, false, terms, -1);
+        collect(node, 1, false, terms);
         const int owner = owners + node;
         for (const Term& part : terms) (void)value(part.node);
         list->owner = owner;
-        int scale = natural(terms, false);
-        if (scale == 1000) scale = 14;
-        scale -= of->coarser_[owner];
-        of->root_of_[owner] = root(terms);
-        result = sum(terms, scale, false);
+        int root = -1;
+        const int scale = natural(terms, false, &root);
+        of->root_of_[owner] = root;
+        result = sum(terms, (scale == none ? 14 : scale) - of->coarser_[owner], false);
         if (narrows && is_multiplied(node)) {
           // Its scale: owner of the narrow one.
-          const int to =
-              (std::min)(result.scale, of->narrow_scale_.count(owner) > 0 ? of->narrow_scale_[owner]
-                                                                          : result.scale);
-          result = list->to_scale(result, to, of->rounds_);
+          const auto to = of->narrow_scale_.find(owner);
+          if (to != of->narrow_scale_.end()) {
+            result = list->to_scale(result, (std::min)(result.scale, to->second), of->rounds_);
+          }
           narrow.push_back(result.line);
           of->narrow_lines_.emplace_back(list, result.line, owner);
         }

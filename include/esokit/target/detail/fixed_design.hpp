@@ -17,11 +17,7 @@ namespace esokit::detail {
 /// A recorded design in integers.
 class FixedDesign : public FixedBuilder {
  public:
-  FixedDesign(const RecordedDesign& design, const FixedPointOptions& options)
-      : FixedBuilder(design, options) {}
-  FixedDesign(const RecordedDesign& design, const FixedPointOptions& options,
-              const FixedLayout* given)
-      : FixedBuilder(design, options, given) {}
+  using FixedBuilder::FixedBuilder;
 
   /// Chooses scales, builds the lists, computes the bounds; false if refused.
   bool make();
@@ -55,7 +51,7 @@ class FixedDesign : public FixedBuilder {
   [[nodiscard]] int exceeded() const;
   [[nodiscard]] double allowed(std::size_t i) const;
 
-  void refuse_bound(int i);
+  bool refuse_bound(int i);
 
   // ---- The law.
 

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <esokit/core/detail/compiled.hpp>
+#include <esokit/core/error.hpp>
 #include <esokit/target/detail/fixed_bounds.hpp>
 #include <esokit/target/detail/integer_list.hpp>
 #include <esokit/target/detail/linear_call.hpp>
@@ -22,17 +23,14 @@ class FixedRecord {
  public:
   using Value = IntegerValue;
 
-  FixedRecord(const RecordedDesign& design, const FixedPointOptions& options)
-      : design_(&design), options_(options), wraps_(options.y.counter_bits > 0) {}
-
-  /// @param given scales and order that settings of this design are to fit into
+  /// @param given scales and order that settings of this design are to fit into, or null
   FixedRecord(const RecordedDesign& design, const FixedPointOptions& options,
-              const FixedLayout* given);
+              const FixedLayout* given = nullptr);
   /// @param others layouts of designs whose settings are to fit, too; none: as they are
   void make_room(const std::vector<FixedLayout>& others);
   FixedLayout layout{};
 
-  FixedRefusal refusal{};
+  Error<double> refusal{};
 
   IntegerList update{0};
   std::vector<int> next{};       ///< the line of the next word of each state

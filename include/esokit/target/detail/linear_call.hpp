@@ -41,16 +41,6 @@ class LinearCall {
   std::size_t constant_;
 };
 
-/// What is refused.
-struct FixedRefusal {
-  const char* field = nullptr;
-  double value = 0;
-  const char* rule = "";
-  int index = -1;
-  double limit = 0;
-  bool has_limit = false;
-};
-
 }  // namespace esokit::detail
 
 #if defined(ESOKIT_HEADER_ONLY)

@@ -65,6 +65,20 @@ std::string listed(const All& all, const One& one) {
   return text;
 }
 
+/// What `one` makes of 0 .. count - 1, one after the other; `counted`: with commas.
+/// @{
+template <class Count, class One>
+std::string each(Count count, const One& one) {
+  std::string text;
+  for (Count i = 0; i < count; ++i) text += one(i);
+  return text;
+}
+template <class Count, class One>
+std::string counted(Count count, const One& one) {
+  return each(count, [&](Count i) { return (i > 0 ? ", " : "") + one(i); });
+}
+/// @}
+
 /// Writes recorded calls line by line.
 class ListWriter {
  public:

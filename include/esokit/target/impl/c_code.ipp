@@ -488,17 +488,6 @@ class CDesign {
   static std::string at(const char* name, int i) {
     return std::string(name) + "[" + std::to_string(i) + "]";
   }
-  template <class One>
-  static std::string each(int count, const One& one) {
-    std::string text;
-    for (int i = 0; i < count; ++i) text += one(i);
-    return text;
-  }
-  template <class One>
-  static std::string counted(int count, const One& one) {
-    return each(count, [&](int i) { return (i > 0 ? ", " : "") + one(i); });
-  }
-
   const RecordedDesign& design_;
   std::string hash_;
   ListWriter writer_;

@@ -67,10 +67,8 @@ ESOKIT_FUNCTION void FixedBuilder::build(const std::vector<bool>& keeps) {
     s -= coarser_[static_cast<int>(i)];
     if (i < room_.scale.size()) s = (std::min)(s, room_.scale[i]);
     written.scale[i] = given_ != nullptr ? given_->scale[i] : s;
-    if (!keeps[i])
-      builder.words.push_back(update.state(static_cast<int>(i), written.scale[i], 0, nullptr));
-    else
-      builder.words.push_back({});
+    builder.words.push_back(
+        keeps[i] ? Value{} : update.state(static_cast<int>(i), written.scale[i], 0, nullptr));
     builder.rests.push_back({});
   }
   // Rows that keep what is left over: how many bits.
@@ -86,16 +84,13 @@ ESOKIT_FUNCTION void FixedBuilder::build(const std::vector<bool>& keeps) {
   next_rest.assign(n, -1);
   next_form_.assign(n, {});
   // Results that are the next of a state and used by others come when they are needed.
-  for (std::size_t i = 0; i < n; ++i) {
-    const int node = call.next[numbers[i]];
-    build_row(builder, i, node, keeps[i]);
-  }
+  for (std::size_t i = 0; i < n; ++i) build_row(builder, i, call.next[numbers[i]], keeps[i]);
 }
 
 ESOKIT_FUNCTION void FixedBuilder::build_row(Builder& b, std::size_t i, int node, bool keeps) {
   const std::size_t n = states();
   std::vector<Term> terms;
-  b.collect(node, 1, false, terms, -1);
+  b.collect(node, 1, false, terms);
   // Without what is left over, what contains the state itself has its scale.
   const auto self = [&](const Term& t) {
     return b.at(t.node).operation == Operation::argument &&
@@ -110,21 +105,11 @@ ESOKIT_FUNCTION void FixedBuilder::build_row(Builder& b, std::size_t i, int node
         bool has_self = false;
         if (b.at(t.node).operation != Operation::argument && !t.varies &&
             !(std::fabs(t.coefficient - 1) > 0)) {
-          b.collect(t.node, 1, false, inner, -1);
+          b.collect(t.node, 1, false, inner);
           has_self = contains(b, inner, i, 3);
         }
         if (!has_self) inner = {t};
-        for (const Term& part : inner) {
-          bool found = false;
-          for (Term& o : open) {
-            if (o.node == part.node) {
-              o.coefficient += part.coefficient;
-              o.varies = o.varies || part.varies;
-              found = true;
-            }
-          }
-          if (!found) open.push_back(part);
-        }
+        for (const Term& part : inner) Builder::add(open, part);
       }
       terms = open;
     }
@@ -139,16 +124,14 @@ ESOKIT_FUNCTION void FixedBuilder::build_row(Builder& b, std::size_t i, int node
       // First the natural scale: of what comes finer, and of full gains.
       const int fine = b.natural(others, true);
       bool negative = false;
-      int product = 1000;
+      int product = Builder::none;
       for (const Term& t : others) {
-        int odd = 0;
-        int exponent = 0;
-        if (is_short(t, odd, exponent)) continue;
-        if (b.input_of(t.node) != nullptr) continue;
+        int odd = 0, exponent = 0;
+        if (is_short(t, odd, exponent) || b.input_of(t.node) != nullptr) continue;
         product = (std::min)(product, b.term(t, s, true, negative).scale);
       }
-      int scale = fine == 1000 ? product : (std::min)(fine, product);
-      if (scale == 1000) scale = s + 16;
+      int scale = (std::min)(fine, product);
+      if (scale == Builder::none) scale = s + 16;
       left_over_scale_[static_cast<int>(i)] = scale > s ? scale : s + 1;
       again_ = true;
     }
@@ -191,7 +174,7 @@ ESOKIT_FUNCTION bool FixedBuilder::contains(const Builder& b, const std::vector<
       if (state_of_argument(b.at(t.node).a) == static_cast<int>(state)) return true;
     } else if (depth > 0) {
       std::vector<Term> inner;
-      b.collect(t.node, 1, false, inner, -1);
+      b.collect(t.node, 1, false, inner);
       if (contains(b, inner, state, depth - 1)) return true;
     }
   }

@@ -16,28 +16,23 @@ namespace esokit::detail {
 ESOKIT_FUNCTION bool FixedDesign::make() {
   if (!checks() || !takes_design()) return false;
   std::vector<bool> keeps(states(), false);
-  if (given_ != nullptr) {
-    if (given_->keeps.size() != states() || (given_->law_scale > 0) != design_->is_controller) {
-      return refuse("settings_for", static_cast<double>(states()),
-                    "must be the code of such an object");
-    }
-    keeps = given_->keeps;
+  const auto takes = [&](const FixedLayout& other) {
+    keeps = other.keeps;
+    return keeps.size() == states() && (other.law_scale > 0) == design_->is_controller;
+  };
+  if (given_ != nullptr && !takes(*given_)) {
+    return refuse("settings_for", static_cast<double>(states()),
+                  "must be the code of such an object");
   }
-  if (!room_.scale.empty()) {
-    if (room_.keeps.size() != states() || (room_.law_scale > 0) != design_->is_controller) {
-      return refuse("room_for", static_cast<double>(states()), "must be the codes of such objects");
-    }
-    keeps = room_.keeps;
+  if (!room_.scale.empty() && !takes(room_)) {
+    return refuse("room_for", static_cast<double>(states()), "must be the codes of such objects");
   }
   for (;;) {
     if (!builds(keeps)) return false;
     bounds();
     const int worst = exceeded();
     if (worst < 0) break;
-    if (given_ != nullptr) {
-      refuse_bound(worst);
-      return false;
-    }
+    if (given_ != nullptr) return refuse_bound(worst);
     if (!rounds_) {
       rounds_ = true;
       continue;
@@ -51,10 +46,7 @@ ESOKIT_FUNCTION bool FixedDesign::make() {
         row = i;
       }
     }
-    if (row == states()) {
-      refuse_bound(worst);
-      return false;
-    }
+    if (row == states()) return refuse_bound(worst);
     keeps[row] = true;
   }
   for (std::size_t i = 0; i < estimates.size(); ++i) {
@@ -269,7 +261,7 @@ ESOKIT_FUNCTION double FixedDesign::allowed(std::size_t i) const {
   return given ? options_.most_deviation[i] : estimates[i].half_count;
 }
 
-ESOKIT_FUNCTION void FixedDesign::refuse_bound(int i) {
+ESOKIT_FUNCTION bool FixedDesign::refuse_bound(int i) {
   const auto at = static_cast<std::size_t>(i);
   refusal = {"most_deviation",
              estimates[at].deviation,
@@ -281,6 +273,7 @@ ESOKIT_FUNCTION void FixedDesign::refuse_bound(int i) {
              i,
              allowed(at),
              true};
+  return false;
 }
 
 ESOKIT_FUNCTION bool FixedDesign::law_fits() {
@@ -325,7 +318,7 @@ ESOKIT_FUNCTION bool FixedDesign::law_fits() {
           law.state(static_cast<int>(i), written.scale[i], written.left_over[i], &rest));
     }
     std::vector<Term> terms;
-    builder.collect(output, builder.factor, false, terms, -1);
+    builder.collect(output, builder.factor, false, terms);
     law.owner = 0;
     // What is multiplied keeps its own owner.
     for (const Term& t : terms) (void)builder.value(t.node);

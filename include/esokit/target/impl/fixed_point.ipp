@@ -95,37 +95,25 @@ class FixedText {
   }
   std::uint32_t mark = 0;  ///< of what is the same for all settings
 
-  /// Estimates of several states need equal coefficients.
-  [[nodiscard]] bool can_estimate(std::size_t row) const {
-    double c = 0;
-    for (const double x : d_.written.estimates[row]) {
-      if (!(std::fabs(x) > 0)) continue;
-      if (std::fabs(c) > 0 && std::fabs(x - c) > 1e-12 * std::fabs(c)) return false;
-      c = x;
-    }
-    return true;
-  }
-  /// Its coefficient and scale: of one state its own, of several one bit coarser than the coarsest.
-  [[nodiscard]] std::pair<double, int> unit_of(std::size_t row) const {
-    double c = 0;
-    int scale = 1000;
-    int count = 0;
+  /// What an estimate is made of.
+  struct Unit {
+    double c = 0;        ///< the coefficient of its states
+    int scale = 1000;    ///< of one state its own, of several one bit coarser than the coarsest
+    int states = 0;      ///< how many
+    bool is_sum = true;  ///< their coefficients are equal
+  };
+  [[nodiscard]] Unit unit_of(std::size_t row) const {
+    Unit unit;
     for (std::size_t i = 0; i < d_.states(); ++i) {
-      if (!(std::fabs(d_.written.estimates[row][i]) > 0)) continue;
-      c = d_.written.estimates[row][i];
-      scale = (std::min)(scale, d_.written.scale[i]);
-      ++count;
+      const double x = d_.written.estimates[row][i];
+      if (!(std::fabs(x) > 0)) continue;
+      if (unit.states > 0 && std::fabs(x - unit.c) > 1e-12 * std::fabs(unit.c)) unit.is_sum = false;
+      unit.c = x;
+      unit.scale = (std::min)(unit.scale, d_.written.scale[i]);
+      ++unit.states;
     }
-    while (count > 1) {
-      --scale;
-      count = (count + 1) / 2;
-    }
-    return {c, scale};
-  }
-  [[nodiscard]] int states_of(std::size_t row) const {
-    int count = 0;
-    for (const double x : d_.written.estimates[row]) count += std::fabs(x) > 0 ? 1 : 0;
-    return count;
+    for (int count = unit.states; count > 1; count = (count + 1) / 2) --unit.scale;
+    return unit;
   }
 
  private:
@@ -222,6 +210,14 @@ class FixedText {
            names[static_cast<std::size_t>(d_.law_line)] + ";\n}\n\n";
   }
 
+  /// A number as 28 bits and the power of two by which these are too large.
+  static std::pair<std::string, std::string> split(double c) {
+    int exponent = 0;
+    (void)std::frexp(c, &exponent);
+    const int power = std::fabs(c) > 0 ? std::clamp(28 - exponent, 0, 62) : 0;
+    return {text_of(static_cast<std::int64_t>(std::nearbyint(std::ldexp(c, power)))),
+            std::to_string(power)};
+  }
   /// Rows of numbers as mantissas and powers of two. @param columns the scales of what they
   /// multiply
   void matrix(const std::vector<LinearForm>& rows, double of_last, std::string& m,
@@ -234,12 +230,9 @@ class FixedText {
         const int from = j < n ? d_.written.scale[j] : 0;
         const double c =
             std::ldexp(rows[i][j] * (j < n ? 1.0 : of_last), d_.written.scale[i] - from);
-        int exponent = 0;
-        (void)std::frexp(c, &exponent);
-        const int power = std::fabs(c) > 0 ? std::clamp(28 - exponent, 0, 62) : 0;
-        m += (j > 0 ? ", " : "") +
-             text_of(static_cast<std::int64_t>(std::nearbyint(std::ldexp(c, power))));
-        powers += (j > 0 ? ", " : "") + std::to_string(power) + "u";
+        const auto [mantissa, power] = split(c);
+        m += (j > 0 ? ", " : "") + mantissa;
+        powers += (j > 0 ? ", " : "") + power + "u";
       }
       m += "},\n";
       powers += "},\n";
@@ -247,15 +240,13 @@ class FixedText {
   }
 
   [[nodiscard]] const std::string& name() const { return design_.options.name; }
-  template <class One>
-  static std::string listed(std::size_t count, const One& one) {
-    std::string text;
-    for (std::size_t i = 0; i < count; ++i) text += (i > 0 ? ", " : "") + one(i);
-    return text;
-  }
   /// A bound of a state, in its counts.
   [[nodiscard]] std::string scaled(const std::vector<double>& bounds, std::size_t i) const {
     return text_of(static_cast<std::int64_t>(std::ldexp(bounds[i], d_.written.scale[i])));
+  }
+  /// Of all.
+  [[nodiscard]] std::string scaled(const std::vector<double>& bounds) const {
+    return counted(bounds.size(), [&](std::size_t i) { return scaled(bounds, i); });
   }
 
   void set_features() {
@@ -295,17 +286,13 @@ class FixedText {
   void set_limits() {
     const LoopRules& loop = design_.loop;
     const std::int64_t one = std::int64_t(1) << d_.law_scale;
-    const auto fine = [&](double physical) {
-      return text_of(static_cast<std::int64_t>(std::nearbyint(physical / d_.options().u.unit)) *
-                     one);
-    };
     text_.constant("LAW_SCALE", std::to_string(d_.law_scale));
     text_.constant("ONE", text_of(one));
     text_.constant("HALF", text_of(one / 2));
-    text_.constant("LOWER", lower());
-    text_.constant("UPPER", upper());
-    text_.constant("RATE", rate());
-    text_.constant("SAFE_INPUT", fine(loop.safe_input));
+    text_.constant("LOWER", fine(d_.lower));
+    text_.constant("UPPER", fine(d_.upper));
+    text_.constant("RATE", fine(d_.rate));
+    text_.constant("SAFE_INPUT", fine(std::nearbyint(loop.safe_input / d_.options().u.unit)));
     text_.constant("HOLD_INPUT", text_of(d_.hold_counts() * one));
     text_.constant("START_FINE", text_of(d_.start_held() * one));
     text_.constant("START_HELD", text_of(d_.start_held()));
@@ -313,14 +300,9 @@ class FixedText {
     text_.count("MISSING_LIMIT", loop.missing_limit);
     text_.constant("FIRST_MODE", loop.hold_left > 0 ? "1u" : "0u");
   }
-  [[nodiscard]] std::string lower() const {
-    return text_of(static_cast<std::int64_t>(d_.lower) * (std::int64_t(1) << d_.law_scale));
-  }
-  [[nodiscard]] std::string upper() const {
-    return text_of(static_cast<std::int64_t>(d_.upper) * (std::int64_t(1) << d_.law_scale));
-  }
-  [[nodiscard]] std::string rate() const {
-    return text_of(static_cast<std::int64_t>(std::floor(std::ldexp(d_.rate, d_.law_scale))));
+  /// Counts of u as they are kept.
+  [[nodiscard]] std::string fine(double counts) const {
+    return text_of(static_cast<std::int64_t>(std::floor(std::ldexp(counts, d_.law_scale))));
   }
   void set_words() {
     const bool wraps = d_.wraps();
@@ -335,7 +317,7 @@ class FixedText {
     const std::size_t n = d_.states();
     std::string members =
         "  int32_t x[" + std::to_string(n) + "]; /* in counts of y and 2^-" +
-        filled(listed(n, [&](std::size_t i) { return std::to_string(d_.written.scale[i]); }),
+        filled(counted(n, [&](std::size_t i) { return std::to_string(d_.written.scale[i]); }),
                {{", ", ", 2^-"}}) +
         " */\n";
     std::string forget;
@@ -370,13 +352,9 @@ class FixedText {
         const double c =
             at[i][n + static_cast<std::size_t>(input)] * (input == 0 ? 1.0 : of_u) * scale;
         if (!(std::fabs(c) > 0)) continue;
-        int exponent = 0;
-        (void)std::frexp(c, &exponent);
-        const int power = std::clamp(28 - exponent, 0, 62);
+        const auto [mantissa, power] = split(c);
         sum += (sum.empty() ? "" : " + ") + std::string("((") + (input == 0 ? "y" : "u") +
-               " * ((int64_t)" +
-               text_of(static_cast<std::int64_t>(std::nearbyint(std::ldexp(c, power)))) + ")) >> " +
-               std::to_string(power) + ")";
+               " * ((int64_t)" + mantissa + ")) >> " + power + ")";
       }
       const std::string number = std::to_string(i);
       const std::string most = opens_ ? "o->settings->box[" + number + "]" : scaled(d_.box, i);
@@ -392,13 +370,13 @@ class FixedText {
     const std::string upper = begin_of_constants(name());
     for (std::size_t row = 0; row < d_.estimates.size(); ++row) {
       const std::string number = std::to_string(row);
-      const auto [c, scale] = unit_of(row);
+      const Unit unit = unit_of(row);
       units += "#define " + upper + "_ESTIMATE_" + number + "_UNIT (" +
-               text_of(std::ldexp(c, -scale)) + ")\n";
+               text_of(std::ldexp(unit.c, -unit.scale)) + ")\n";
       std::string sum;
       for (std::size_t i = 0; i < d_.states(); ++i) {
         if (!(std::fabs(d_.written.estimates[row][i]) > 0)) continue;
-        const int down = d_.written.scale[i] - scale;
+        const int down = d_.written.scale[i] - unit.scale;
         const std::string x = "o->x[" + std::to_string(i) + "]";
         sum += (sum.empty() ? "" : " + ") +
                (down > 0 ? "(" + x + " >> " + std::to_string(down) + ")" : x);
@@ -424,23 +402,17 @@ class FixedText {
     }
     text_.lines("DESIGN_CORRECT_M", correct_m_);
     text_.lines("DESIGN_CORRECT_P", correct_p_);
-    text_.replace("DESIGN_REACH", reach());
-    text_.replace("DESIGN_BOX", box());
-  }
-  [[nodiscard]] std::string reach() const {
-    return listed(d_.states(), [&](std::size_t i) { return scaled(d_.reach, i); });
-  }
-  [[nodiscard]] std::string box() const {
-    return listed(d_.states(), [&](std::size_t i) { return scaled(d_.box, i); });
+    text_.replace("DESIGN_REACH", scaled(d_.reach));
+    text_.replace("DESIGN_BOX", scaled(d_.box));
   }
   [[nodiscard]] std::string settings() const {
-    std::string set =
-        "const " + name() + "_settings " + name() + "_" + design_.options.settings_name +
-        " = {\n  " + std::to_string(mark) + "u,\n  {" +
-        listed(gains_.size(), [&](std::size_t i) { return std::to_string(gains_[i]); }) +
-        "},\n  {" + reach() + "},\n  {" + box() + "},\n";
-    if (design_.is_controller) set += "  " + lower() + ",\n  " + upper() + ",\n";
-    if (d_.rate > 0) set += "  " + rate() + ",\n";
+    std::string set = "const " + name() + "_settings " + name() + "_" +
+                      design_.options.settings_name + " = {\n  " + std::to_string(mark) +
+                      "u,\n  {" +
+                      listed(gains_, [](std::int32_t gain) { return std::to_string(gain); }) +
+                      "},\n  {" + scaled(d_.reach) + "},\n  {" + scaled(d_.box) + "},\n";
+    if (design_.is_controller) set += "  " + fine(d_.lower) + ",\n  " + fine(d_.upper) + ",\n";
+    if (d_.rate > 0) set += "  " + fine(d_.rate) + ",\n";
     return set + "  {\n" + correct_m_ + "  },\n  {\n" + correct_p_ + "  }\n};\n\n";
   }
   void set_about(const std::string& comment, const std::string& identity) {
@@ -519,19 +491,16 @@ ESOKIT_FUNCTION Expected<FixedCode, Error<double>> fixed_code(const RecordedDesi
     if (other != nullptr) others.push_back(other->layout);
   }
   if (!given) design.make_room(others);  // that code has it
-  if (!design.make()) {
-    const FixedRefusal& no = design.refusal;
-    return Error<double>{no.field, no.value, no.rule, no.index, no.limit, no.has_limit};
-  }
+  if (!design.make()) return design.refusal;
   FixedText text(design);
   for (std::size_t row = 0; row < design.estimates.size(); ++row) {
-    if (!text.can_estimate(row)) {
+    const auto unit = text.unit_of(row);
+    if (!unit.is_sum) {
       return Error<double>{"observer", static_cast<double>(row),
                            "has an estimate that is no sum of states"};
     }
-    if (text.states_of(row) > 1) {  // what reading it shifts away
-      const auto [c, scale] = text.unit_of(row);
-      design.estimates[row].deviation += std::fabs(std::ldexp(c, -scale)) * text.states_of(row);
+    if (unit.states > 1) {  // what reading it shifts away
+      design.estimates[row].deviation += std::fabs(std::ldexp(unit.c, -unit.scale)) * unit.states;
     }
   }
   FixedCode made{text.code(), design.estimates, design.input, design.written, design.layout};

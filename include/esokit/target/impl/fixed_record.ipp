@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <esokit/core/check.hpp>
 #include <esokit/target/detail/fixed_bounds.hpp>
 #include <esokit/target/detail/fixed_record.hpp>
 #include <esokit/target/detail/integer_list.hpp>
@@ -15,8 +16,7 @@ namespace esokit::detail {
 
 ESOKIT_FUNCTION FixedRecord::FixedRecord(const RecordedDesign& design,
                                          const FixedPointOptions& options, const FixedLayout* given)
-    : FixedRecord(design, options) {
-  given_ = given;
+    : design_(&design), given_(given), options_(options), wraps_(options.y.counter_bits > 0) {
   if (given == nullptr) return;
   layout = *given;
   rounds_ = given->rounds;
@@ -96,10 +96,8 @@ ESOKIT_FUNCTION std::vector<LinearForm> FixedRecord::rows_of(
   for (std::size_t i = 0; i < states(); ++i) {
     LinearForm row(states() + given.size(), 0.0);
     const int at = call.next[numbers[i]];
-    if (at < 0)
-      row[i] = 1;
-    else
-      row = forms.of[static_cast<std::size_t>(at)];
+    row[i] = 1;
+    if (at >= 0) row = forms.of[static_cast<std::size_t>(at)];
     row.resize(states() + given.size());
     rows.push_back(row);
   }
@@ -108,7 +106,7 @@ ESOKIT_FUNCTION std::vector<LinearForm> FixedRecord::rows_of(
 
 ESOKIT_FUNCTION bool FixedRecord::refuse(const char* field, double value, const char* rule,
                                          int index) {
-  if (refusal.field == nullptr) refusal = {field, value, rule, index};
+  refusal = {field, value, rule, index};
   return false;
 }
 
@@ -122,84 +120,58 @@ ESOKIT_FUNCTION const RecordedCall& FixedRecord::called(const char* name) const 
 ESOKIT_FUNCTION bool FixedRecord::checks() {
   const auto& y = options_.y;
   const auto& u = options_.u;
-  if (!(y.unit > 0) || std::isinf(y.unit))
-    return refuse("y.unit", y.unit, "must be finite and positive");
-  if (!(u.unit > 0) || std::isinf(u.unit))
-    return refuse("u.unit", u.unit, "must be finite and positive");
-  if (y.most < 1 || y.most > (1 << 24)) return refuse("y.most", y.most, "must be 1 .. 2^24");
-  if (u.most < 1 || u.most > (1 << 24)) return refuse("u.most", u.most, "must be 1 .. 2^24");
-  if (u.counter_bits != 0)
-    return refuse("u.counter_bits", u.counter_bits, "must be 0: u is no counter");
-  if (wraps_ && (y.counter_bits < 2 || y.counter_bits > 16)) {
-    return refuse("y.counter_bits", y.counter_bits, "must be 2 .. 16, or 0");
-  }
-  if (wraps_ && y.most >= (1 << (y.counter_bits - 1))) {
-    return refuse("y.most", y.most,
-                  "must be less than half the range of the counter: of a "
-                  "faster one nobody can say in which direction it went");
-  }
-  if (options_.innovation_bits != 16 && options_.innovation_bits != 32) {
-    return refuse("innovation_bits", options_.innovation_bits, "must be 16 or 32");
-  }
-  if (!design_->line.empty()) {
-    return refuse("observer", static_cast<double>(design_->line.size() - 1),
-                  "is in DelayedInput, which is not written in fixed point: keep the u of earlier "
-                  "samples yourself");
-  }
-  if (design_->gate.threshold > 0) {
-    return refuse("observer", design_->gate.threshold,
-                  "is in OutlierGate, which is not written in fixed point");
-  }
-  if (design_->predictive) {
-    return refuse("controller", 0, "is PredictiveAdrc, which is not written in fixed point");
-  }
-  if (design_->rest.on) {
-    return refuse("controller", design_->rest.error,
-                  "is in Resting, which is not written in fixed point: keep u yourself while y "
-                  "is near the reference");
-  }
-  if (design_->wrap.period > 0) {
-    return refuse("observer", design_->wrap.period,
-                  "is in WrappedOutput: in fixed point take the observer without it, and "
-                  "y.counter_bits");
-  }
-  if (design_->guard.on) {
-    return refuse("observer", design_->guard.trust,
-                  "is in Guarded, which is not written in fixed point");
-  }
-  if (design_->measured.on) {
-    return refuse("observer", design_->measured.paths[0].gain,
-                  "is in Measured, which is not written in fixed point");
-  }
-  if (!design_->map.lines.empty()) {
-    return refuse("observer", design_->map.lines[0][1],
-                  "is in MappedInput, which is not written in fixed point: give u the table of "
-                  "its effect yourself");
-  }
-  if (design_->known.on) {
-    return refuse("observer", 0, "is in KnownModel, which is not written in fixed point");
-  }
-  if (design_->law.kind != RunningLaw::none && !design_->law.settled) {
-    return refuse("observer", static_cast<double>(design_->law.age),
-                  "has gains that go on: let it settle first (AlgebraicEso), freeze the filter "
-                  "(RiccatiMode::frozen), or take a LinearEso");
-  }
-  if (design_->law.watches) {
-    return refuse("outlier_threshold", 1, "is not written in fixed point");
-  }
-  if ((options_.settings_for != nullptr || !options_.room_for.empty()) &&
-      design_->settings.empty()) {
-    return refuse("settings_in_struct", 0, "must be true for settings_for, here and there");
-  }
-  if (design_->loop.divider > 1) {
-    return refuse("measurement_divider", design_->loop.divider, "must be 1 in fixed point");
-  }
-  if (design_->error_based || design_->softens || design_->compensates) {
-    return refuse("controller", 0,
-                  "is error-based, softens or compensates: only Adrc from y up to order 2 is "
-                  "written in fixed point");
-  }
-  return true;
+  const RecordedDesign& d = *design_;
+  const int half = 1 << (std::clamp(y.counter_bits, 2, 16) - 1);
+  const auto& w = d.measured.paths;
+  const auto& lines = d.map.lines;
+  const bool shares = options_.settings_for != nullptr || !options_.room_for.empty();
+  Rules<double> rules;
+  rules.positive("y.unit", y.unit)
+      .positive("u.unit", u.unit)
+      .demand(1 <= y.most && y.most <= (1 << 24), "y.most", y.most, "must be 1 .. 2^24")
+      .demand(1 <= u.most && u.most <= (1 << 24), "u.most", u.most, "must be 1 .. 2^24")
+      .demand(u.counter_bits == 0, "u.counter_bits", u.counter_bits, "must be 0: u is no counter")
+      .demand(!wraps_ || (2 <= y.counter_bits && y.counter_bits <= 16), "y.counter_bits",
+              y.counter_bits, "must be 2 .. 16, or 0")
+      .demand(!wraps_ || y.most < half, "y.most", y.most,
+              "must be less than half the range of the counter: of a "
+              "faster one nobody can say in which direction it went")
+      .demand(options_.innovation_bits == 16 || options_.innovation_bits == 32, "innovation_bits",
+              options_.innovation_bits, "must be 16 or 32")
+      .demand(d.line.empty(), "observer", static_cast<double>(d.line.size()) - 1,
+              "is in DelayedInput, which is not written in fixed point: keep the u of earlier "
+              "samples yourself")
+      .demand(!(d.gate.threshold > 0), "observer", d.gate.threshold,
+              "is in OutlierGate, which is not written in fixed point")
+      .demand(!d.predictive, "controller", 0,
+              "is PredictiveAdrc, which is not written in fixed point")
+      .demand(!d.rest.on, "controller", d.rest.error,
+              "is in Resting, which is not written in fixed point: keep u yourself while y "
+              "is near the reference")
+      .demand(!(d.wrap.period > 0), "observer", d.wrap.period,
+              "is in WrappedOutput: in fixed point take the observer without it, and "
+              "y.counter_bits")
+      .demand(!d.guard.on, "observer", d.guard.trust,
+              "is in Guarded, which is not written in fixed point")
+      .demand(!d.measured.on, "observer", w.empty() ? 0 : w[0].gain,
+              "is in Measured, which is not written in fixed point")
+      .demand(lines.empty(), "observer", lines.empty() ? 0 : lines[0][1],
+              "is in MappedInput, which is not written in fixed point: give u the table of "
+              "its effect yourself")
+      .demand(!d.known.on, "observer", 0, "is in KnownModel, which is not written in fixed point")
+      .demand(d.law.kind == RunningLaw::none || d.law.settled, "observer", d.law.age,
+              "has gains that go on: let it settle first (AlgebraicEso), freeze the filter "
+              "(RiccatiMode::frozen), or take a LinearEso")
+      .demand(!d.law.watches, "outlier_threshold", 1, "is not written in fixed point")
+      .demand(!shares || !d.settings.empty(), "settings_in_struct", 0,
+              "must be true for settings_for, here and there")
+      .demand(d.loop.divider <= 1, "measurement_divider", d.loop.divider,
+              "must be 1 in fixed point")
+      .demand(!d.error_based && !d.softens && !d.compensates, "controller", 0,
+              "is error-based, softens or compensates: only Adrc from y up to order 2 is "
+              "written in fixed point");
+  if (!rules) refusal = rules.error();
+  return static_cast<bool>(rules);
 }
 
 ESOKIT_FUNCTION bool FixedRecord::takes_design() {
