@@ -158,7 +158,7 @@ detail::RecordedDesign design_of(Random& random) {
   }
   d.loop.holds_safe = is();
   d.loop.stays_safe = is();
-  d.hold = is() ? 13 : 0;
+  d.loop.hold_left = is() ? 13 : 0;
   if (d.is_controller) {
     d.loop.divider = is() ? 3 : 1;
     d.softens = !d.compensates && is();

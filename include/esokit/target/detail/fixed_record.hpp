@@ -81,10 +81,13 @@ class FixedRecord {
 
   [[nodiscard]] bool refuse(const char* field, double value, const char* rule, int index = -1);
 
-  [[nodiscard]] const RecordedCall& called(const char* name) const;
+  /// One that each design has.
+  [[nodiscard]] const RecordedCall& called(const std::string& name) const {
+    return *design_->called(name);
+  }
   [[nodiscard]] LinearCall linear(const RecordedCall& call,
                                   const std::vector<double>& given) const {
-    return {call, state_of_, design_->numbers, states(), given, design_->settings};
+    return {*design_, call, given};
   }
 
   bool checks();
@@ -105,7 +108,6 @@ class FixedRecord {
   double gain_too_large_ = 0;  ///< times what its scale holds
   FixedPointOptions options_;
   bool wraps_;
-  std::vector<int> state_of_;
   std::vector<double> exact_a_;
   std::vector<double> exact_by_;
   std::vector<double> exact_bu_;

@@ -16,12 +16,10 @@ namespace esokit::detail {
 /// A recorded call as numbers: what is linear in states and arguments, for each instruction.
 class LinearCall {
  public:
-  /// @param state_of for each number of the object which state it is, or -1
-  /// @param given arguments that are numbers; NaN: the argument is a column
-  /// @param settings which numbers may be changed while it runs, or empty
-  LinearCall(const RecordedCall& call, const std::vector<int>& state_of,
-             const std::vector<double>& values, std::size_t states,
-             const std::vector<double>& given, const std::vector<bool>& settings = {});
+  /// @param call of the design @param given arguments that are numbers; NaN: the argument is a
+  ///        column
+  LinearCall(const RecordedDesign& design, const RecordedCall& call,
+             const std::vector<double>& given);
 
   std::vector<LinearForm> of{};  ///< states, arguments, the constant
   std::vector<bool> linear{};

@@ -41,9 +41,14 @@ struct RecordAccess {
   static auto& loop(C& c) noexcept {
     return c.loop_;
   }
+  /// Of a controller, in one phase or two.
   template <class C>
   static auto& limiter_of(C& c) noexcept {
-    return c.loop_.limiter_;
+    if constexpr (requires { c.loop_; }) {
+      return c.loop_.limiter_;
+    } else {
+      return c.limiter_;
+    }
   }
   /// u of the law for the present estimate, before the limits; as if no start hold were left.
   template <class C, class Given>
@@ -256,24 +261,17 @@ struct RecordAccess {
     return {O::Numbers::by_rows(O::Numbers::template up_to_level<last>(offset.states)),
             O::Numbers::by_rows(O::Numbers::template up_to_level<last>(slope.states))};
   }
-  template <class C>
-  static unsigned hold_left(const C& c) noexcept {
-    return c.hold_left_;
-  }
   /// Of a controller in two phases.
   template <class C>
   static LoopRules rules_of_phases(const C& c) noexcept {
     LoopRules rules;
+    rules.hold_left = c.hold_left_;
     rules.missing_limit = c.set_.missing_limit;
     rules.holds_safe = c.set_.hold_safe;
     rules.stays_safe = c.set_.stay_safe;
     rules.safe_input = static_cast<double>(c.set_.safe_input);
     rules.elsewhere = c.phase_ == decltype(c.phase_)::started;
     return rules;
-  }
-  template <class C>
-  static const auto& limiter(const C& c) noexcept {
-    return c.limiter_;
   }
   /// Of a controller, in one phase or two.
   template <class C>

@@ -538,8 +538,11 @@ template <class Bare, class BareObserver>
   return maker.record(name_of);
 }
 
-template <Scalar S>
-void take_rate(RecordedDesign& design, const Limiter<S>& limiter) {
+template <class C>
+void take_limits(RecordedDesign& design, const C& controller) {
+  const auto& limiter = RecordAccess::limiter_of(controller);
+  design.lower = static_cast<double>(limiter.lower());
+  design.upper = static_cast<double>(limiter.upper());
   if (is_finite(limiter.step())) design.rate = static_cast<double>(limiter.step());
   design.waits = limiter.waits();
 }
@@ -568,9 +571,7 @@ Expected<RecordedDesign, Error<typename C::scalar_type>> recorded_design(
   if constexpr (IsResting<C>::value) {
     design.rest = Access::rest_of(controller, options.settings_in_struct);
   }
-  design.lower = static_cast<double>(controller.limiter().lower());
-  design.upper = static_cast<double>(controller.limiter().upper());
-  take_rate(design, controller.limiter());
+  take_limits(design, bare);
   take_adapters(design, controller.observer());
   design.law = Access::law_numbers(Access::core(bare.observer()));
   if constexpr (has_law) {
@@ -644,11 +645,8 @@ Expected<RecordedDesign, Error<typename C::scalar_type>> recorded_design(
   RecordedDesign& design = maker.design;
   design.predictive = true;
   design.law = RecordAccess::law_numbers(controller.observer());
-  design.hold = RecordAccess::hold_left(controller);
   design.loop = RecordAccess::rules_of_phases(controller);
-  design.lower = static_cast<double>(RecordAccess::limiter(controller).lower());
-  design.upper = static_cast<double>(RecordAccess::limiter(controller).upper());
-  take_rate(design, RecordAccess::limiter(controller));
+  take_limits(design, controller);
   maker.add("rest_at", "y u", false, [](auto& c, const Numbers& in) {
     RecordAccess::rest(RecordAccess::at_rest(RecordAccess::observer_of(c)), in, false);
     return Numbers{};

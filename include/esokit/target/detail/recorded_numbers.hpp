@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <esokit/core/check.hpp>
 #include <esokit/target/detail/list_writer.hpp>
 #include <esokit/target/recorder.hpp>
@@ -220,13 +221,25 @@ struct RecordedDesign {
   bool softens = false;
   bool compensates = false;                    ///< r is the output of another controller
   bool predictive = false;                     ///< in two phases
-  unsigned hold = 0;                           ///< of one of these: samples of its start hold
   std::vector<std::vector<double>> samples{};  ///< y, r or u, result, status
   std::vector<unsigned> test_calls{};          ///< what of it is called, see self_test.hpp
 
   /// The mode in which it begins.
-  [[nodiscard]] unsigned mode() const {
-    return rest.rests ? 3 : (predictive ? hold : loop.hold_left) > 0 ? 1 : 0;
+  [[nodiscard]] unsigned mode() const { return rest.rests ? 3 : loop.hold_left > 0 ? 1 : 0; }
+  /// The call of a name, or null.
+  [[nodiscard]] const RecordedCall* called(const std::string& name) const {
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      if (names[i].name == name) return &calls[i];
+    }
+    return nullptr;
+  }
+  /// Which numbers are states.
+  [[nodiscard]] std::vector<std::size_t> states() const {
+    std::vector<std::size_t> all;
+    for (std::size_t i = 0; i < members.size(); ++i) {
+      if (members[i][0] == 'z') all.push_back(i);
+    }
+    return all;
   }
   /// How many numbers the reference is.
   [[nodiscard]] int references() const { return options.moving_reference ? order + 1 : 1; }

@@ -169,7 +169,7 @@ class CDesign {
                                     : (std::numeric_limits<double>::max)();
     const auto bridged = static_cast<std::size_t>(d.max_gap) + 1;
     const std::size_t rows = d.recovery.empty() ? bridged : d.recovery.size();
-    const unsigned hold = d.predictive ? d.hold : d.loop.hold_left;
+    const unsigned hold = d.loop.hold_left;
     text_.feature("ESOKIT_HOLDS_AT_START", hold > 0);
     text_.numbers({{"SAMPLE_TIME", d.sample_time}, {"LARGEST", largest}});
     text_.counts({{"ROWS", rows},

@@ -82,32 +82,24 @@ inline std::vector<std::complex<double>> roots(const Polynomial& c) {
 /// What an observer forgets of its state from a sample to the next; empty where the numbers are not
 /// linear in it.
 inline std::vector<LinearForm> transition(const RecordedDesign& design) {
-  std::vector<int> state_of(design.members.size(), -1);
-  std::vector<std::size_t> members;
-  for (std::size_t i = 0; i < design.members.size(); ++i) {
-    if (design.members[i][0] != 'z') continue;
-    state_of[i] = static_cast<int>(members.size());
-    members.push_back(i);
-  }
+  const auto states = design.states();
+  const RecordedCall* call = design.called("observe");
   std::vector<LinearForm> rows;
-  for (std::size_t call = 0; call < design.names.size(); ++call) {
-    if (design.names[call].name != "observe" || !design.gain_is_kept) continue;
-    const double column = std::numeric_limits<double>::quiet_NaN();
-    const LinearCall forms(design.calls[call], state_of, design.numbers, members.size(),
-                           {column, column});
-    for (std::size_t i = 0; i < members.size(); ++i) {
-      const int next = design.calls[call].next[members[i]];
-      LinearForm row(members.size(), 0.0);
-      if (next < 0) {
-        row[i] = 1;
-      } else if (!forms.linear[static_cast<std::size_t>(next)]) {
-        return {};
-      } else {
-        const LinearForm& form = forms.of[static_cast<std::size_t>(next)];
-        std::copy_n(form.begin(), members.size(), row.begin());
-      }
-      rows.push_back(row);
+  if (call == nullptr || !design.gain_is_kept) return rows;
+  const double column = std::numeric_limits<double>::quiet_NaN();
+  const LinearCall forms(design, *call, {column, column});
+  for (const std::size_t state : states) {
+    const int next = call->next[state];
+    LinearForm row(states.size(), 0.0);
+    if (next < 0) {
+      row[rows.size()] = 1;
+    } else if (!forms.linear[static_cast<std::size_t>(next)]) {
+      return {};
+    } else {
+      const LinearForm& form = forms.of[static_cast<std::size_t>(next)];
+      std::copy_n(form.begin(), states.size(), row.begin());
     }
+    rows.push_back(row);
   }
   return rows;
 }
@@ -193,44 +185,36 @@ ESOKIT_FUNCTION std::string dynamics_text(const RecordedDesign& design) {
 }
 
 ESOKIT_FUNCTION std::string scale_text(const RecordedDesign& design, std::size_t state) {
-  std::vector<int> state_of(design.members.size(), -1);
-  int states = 0;
-  for (std::size_t i = 0; i < design.members.size(); ++i) {
-    if (design.members[i][0] == 'z') state_of[i] = states++;
-  }
-  if (state_of[state] < 0) return "";
+  const auto states = design.states();
+  const auto place = std::find(states.begin(), states.end(), state);
+  if (place == states.end()) return "";
+  const auto own = static_cast<std::size_t>(place - states.begin());
   double unit = 1;  // of a chain: T^row / row!
   for (int row = 0; row < design.size; ++row) {
     if (row > 0) unit *= design.sample_time / row;
-    for (std::size_t call = 0; call < design.names.size(); ++call) {
-      if (design.names[call].name != "estimate_" + std::to_string(row)) continue;
-      const LinearCall forms(design.calls[call], state_of, design.numbers,
-                             static_cast<std::size_t>(states), {});
-      const auto output = static_cast<std::size_t>(design.calls[call].outputs[0]);
-      if (!forms.linear[output]) continue;
-      double factor = 0;
-      int others = 0;
-      for (int i = 0; i < states; ++i) {
-        const double each = forms.of[output][static_cast<std::size_t>(i)];
-        if (i == state_of[state]) {
-          factor = each;
-        } else if (std::fabs(each) > 0) {
-          ++others;
-        }
-      }
-      if (others > 0 || !(std::fabs(factor) > 0)) continue;
-      const std::string y = design.error_based ? "e" : "y";
-      std::string text = row == design.order  ? "dhat"
-                         : row < design.order ? y + std::string(static_cast<std::size_t>(row), '\'')
-                                              : "estimate " + std::to_string(row);
-      if (std::fabs(factor - 1) < 1e-6) return text;
-      if (std::fabs(factor * unit - 1) < 1e-4) {
-        text += row > 1 ? " T^" + std::to_string(row) : " T";
-        const int factorial = static_cast<int>(std::lround(std::tgamma(row + 1)));
-        return factorial > 1 ? text + "/" + std::to_string(factorial) : text;
-      }
-      return text + " / " + design_text::digits(factor);
+    const RecordedCall* call = design.called("estimate_" + std::to_string(row));
+    if (call == nullptr) continue;
+    const LinearCall forms(design, *call, {});
+    const auto output = static_cast<std::size_t>(call->outputs[0]);
+    if (!forms.linear[output]) continue;
+    const LinearForm& form = forms.of[output];
+    const double factor = form[own];
+    const auto others =
+        std::count_if(form.begin(), form.begin() + static_cast<std::ptrdiff_t>(states.size()),
+                      [](double x) { return std::fabs(x) > 0; }) -
+        1;
+    if (others > 0 || !(std::fabs(factor) > 0)) continue;
+    const std::string y = design.error_based ? "e" : "y";
+    std::string text = row == design.order  ? "dhat"
+                       : row < design.order ? y + std::string(static_cast<std::size_t>(row), '\'')
+                                            : "estimate " + std::to_string(row);
+    if (std::fabs(factor - 1) < 1e-6) return text;
+    if (std::fabs(factor * unit - 1) < 1e-4) {
+      text += row > 1 ? " T^" + std::to_string(row) : " T";
+      const int factorial = static_cast<int>(std::lround(std::tgamma(row + 1)));
+      return factorial > 1 ? text + "/" + std::to_string(factorial) : text;
     }
+    return text + " / " + design_text::digits(factor);
   }
   return "";
 }

@@ -26,8 +26,8 @@ ESOKIT_FUNCTION bool FixedBuilder::is_short(double c, int& odd, int& exponent) {
 }
 
 ESOKIT_FUNCTION int FixedBuilder::state_of_argument(int argument) const {
-  const auto from = static_cast<std::size_t>(argument);
-  return from < state_of_.size() ? state_of_[from] : -1;
+  const auto at = std::find(numbers.begin(), numbers.end(), static_cast<std::size_t>(argument));
+  return at == numbers.end() ? -1 : static_cast<int>(at - numbers.begin());
 }
 
 ESOKIT_FUNCTION bool FixedBuilder::refuse_settings(double times) {

@@ -110,13 +110,6 @@ ESOKIT_FUNCTION bool FixedRecord::refuse(const char* field, double value, const 
   return false;
 }
 
-ESOKIT_FUNCTION const RecordedCall& FixedRecord::called(const char* name) const {
-  for (std::size_t i = 0; i < design_->names.size(); ++i) {
-    if (design_->names[i].name == name) return design_->calls[i];
-  }
-  return design_->calls[0];
-}
-
 ESOKIT_FUNCTION bool FixedRecord::checks() {
   const auto& y = options_.y;
   const auto& u = options_.u;
@@ -175,12 +168,7 @@ ESOKIT_FUNCTION bool FixedRecord::checks() {
 }
 
 ESOKIT_FUNCTION bool FixedRecord::takes_design() {
-  state_of_.assign(design_->members.size(), -1);
-  for (std::size_t i = 0; i < design_->members.size(); ++i) {
-    if (design_->members[i][0] != 'z') continue;
-    state_of_[i] = static_cast<int>(numbers.size());
-    numbers.push_back(i);
-  }
+  numbers = design_->states();
   const std::size_t n = states();
   const RecordedCall& call = called("observe");
   const LinearCall forms = linear(call, {column, column});
@@ -210,7 +198,7 @@ ESOKIT_FUNCTION bool FixedRecord::takes_design() {
   }
   exact_estimates_.clear();
   for (int row = 0; row < design_->size; ++row) {
-    const RecordedCall& estimate = called(("estimate_" + std::to_string(row)).c_str());
+    const RecordedCall& estimate = called("estimate_" + std::to_string(row));
     const LinearCall of(linear(estimate, {}));
     const int at = estimate.outputs[0];
     if (!of.is_linear(at)) return refuse("observer", row, "has an estimate that is not linear");
@@ -270,11 +258,17 @@ ESOKIT_FUNCTION bool FixedRecord::takes_limits() {
   }
   // A step as large as the range limits nothing.
   if (design_->rate < design_->upper - design_->lower) rate = design_->rate / options_.u.unit;
-  const LinearCall forms = linear(called("law"), {column});
-  if (!forms.is_linear(called("law").outputs[0])) {
+  const RecordedCall* call = design_->called("law");
+  if (call == nullptr) {
+    return refuse("controller", 0,
+                  "takes estimates that are published apart (AlgebraicEso): only "
+                  "its observer is written in fixed point");
+  }
+  const LinearCall forms = linear(*call, {column});
+  if (!forms.is_linear(call->outputs[0])) {
     return refuse("controller", 0, "has a law that is not linear");
   }
-  exact_law_ = forms.of[static_cast<std::size_t>(called("law").outputs[0])];
+  exact_law_ = forms.of[static_cast<std::size_t>(call->outputs[0])];
   exact_law_.resize(states() + 1);
   for (double& x : exact_law_) x *= options_.y.unit / options_.u.unit;
   return true;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <esokit/target/detail/fixed_bounds.hpp>
@@ -11,20 +12,20 @@
 
 namespace esokit::detail {
 
-ESOKIT_FUNCTION LinearCall::LinearCall(const RecordedCall& call, const std::vector<int>& state_of,
-                                       const std::vector<double>& values, std::size_t states,
-                                       const std::vector<double>& given,
-                                       const std::vector<bool>& settings)
-    : constant_(states + given.size()) {
+ESOKIT_FUNCTION LinearCall::LinearCall(const RecordedDesign& design, const RecordedCall& call,
+                                       const std::vector<double>& given)
+    : constant_(design.states().size() + given.size()) {
+  const auto states = design.states();
   const auto of_argument = [&](std::size_t from, LinearForm& form) {
-    if (from >= values.size()) {
-      const std::size_t argument = from - values.size();
+    const auto state = std::find(states.begin(), states.end(), from);
+    if (from >= design.numbers.size()) {
+      const std::size_t argument = from - design.numbers.size();
       const bool is_column = std::isnan(given[argument]);
-      form[is_column ? states + argument : constant_] = is_column ? 1 : given[argument];
-    } else if (state_of[from] >= 0) {
-      form[static_cast<std::size_t>(state_of[from])] = 1;
+      form[is_column ? states.size() + argument : constant_] = is_column ? 1 : given[argument];
+    } else if (state != states.end()) {
+      form[static_cast<std::size_t>(state - states.begin())] = 1;
     } else {
-      form[constant_] = values[from];
+      form[constant_] = design.numbers[from];
     }
   };
   for (const Instruction& one : call.list.instructions) {
@@ -35,7 +36,7 @@ ESOKIT_FUNCTION LinearCall::LinearCall(const RecordedCall& call, const std::vect
     } else if (one.operation == Operation::argument) {
       const auto from = static_cast<std::size_t>(one.a);
       of_argument(from, form);
-      changes = from < settings.size() && settings[from];
+      changes = from < design.settings.size() && design.settings[from];
     } else {
       is_linear = combine(one, form);
       for (const int i : {one.a, one.b, one.c}) {
