@@ -5,6 +5,7 @@
 #include <esokit/core/detail/compiled.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/target/detail/recorded_design.hpp>
+#include <esokit/target/detail/runtime_text.hpp>
 #include <esokit/target/detail/writable.hpp>
 #include <string>
 
@@ -26,6 +27,21 @@ namespace detail {
 template <class Code>
 std::string text_of(const Code& made) {
   return made ? made->header + made->source + made->settings : std::string();
+}
+
+/// The C of what has nothing to record: its files of target/runtime.
+/// @param fill gives their text the features, constants and lines
+template <class S, class Fill>
+Expected<CCode, Error<S>> code_of(const CodeOptions& options, const char* header,
+                                  const char* source, const Fill& fill) {
+  const auto ok = checked_names<S>(options, [&](const CodeOptions& as) {
+    return text_of(code_of<S>(as, header, source, fill));
+  });
+  if (!ok) return ok.error();
+  RuntimeText text(options.name, sizeof(S) == sizeof(float));
+  text.lines("DESIGN_ABOUT", options.comment.empty() ? "" : " * " + options.comment + "\n");
+  fill(text);
+  return CCode{text.header(header), text.source({runtime::head, source}), {}};
 }
 
 /// The texts; settings bear a mark of what else is in them.

@@ -53,45 +53,39 @@ requires std::same_as<S, typename Controller::scalar_type> Expected<CCode, Error
     const CodeOptions& options = {.name = "health"}) {
   static_assert(std::remove_cvref_t<decltype(controller.observer())>::size == Size,
                 "esokit: Size of the monitor must be the number of states of the observer");
-  const auto ok = detail::checked_names<S>(options, [&](const CodeOptions& as) {
-    return detail::text_of(to_c(monitor, controller, as));
-  });
-  if (!ok) return ok.error();
-  detail::RuntimeText text(options.name, sizeof(S) == sizeof(float));
-  const auto settings = detail::RecordAccess::health(monitor, controller);
-  for (const auto& [name, x] : settings.constants) text.number(name, x);
-  // The limits of a diagnosis are double, whatever the monitor is.
-  const detail::ListWriter in_double(detail::c_language, false);
-  const HealthLimits limits;
-  for (const auto& [name, x] : std::initializer_list<std::pair<const char*, double>>{
-           {"FOR_EVIDENCE", limits.evidence},
-           {"FOR_EVIDENCE_OF_SIGN", limits.evidence_of_sign},
-           {"FOR_OPPOSED", limits.opposed},
-           {"FOR_SIGN_RATIO", limits.sign_ratio},
-           {"FOR_STEADY", limits.steady},
-           {"FOR_STEADY_RATIO", limits.steady_ratio},
-           {"RIGHT_SIGN", -limits.sign_ratio},
-           {"FOR_STANDING", 0.99},
-           {"FOR_WRONG_SIGN", limits.wrong_sign},
-           {"FOR_TOO_SMALL", limits.too_small},
-           {"FOR_RESPONSE", limits.response},
-           {"FOR_TOO_LARGE", limits.too_large},
-           {"NEGATIVE", 0},
-           {"ONCE", 1},
-           {"A_QUARTER", 4},
-           {"OFTEN_LIMITED", 0.05},
-           {"ONE_SIDE", 0.8}}) {
-    text.constant(name, in_double.number(x));
-  }
-  text.count("SIZE", Size);
-  text.count("DIVIDER", static_cast<std::size_t>(settings.divider));
-  text.replace("DESIGN_MEMORY",
-               std::to_string(static_cast<long long>(S(1) / settings.weight + S(0.5))));
-  text.replace("DESIGN_ROW", std::to_string(Controller::order));
-  text.lines("DESIGN_ABOUT", options.comment.empty() ? "" : " * " + options.comment + "\n");
-  return CCode{text.header(detail::runtime::health_header),
-               text.source({detail::runtime::head, detail::runtime::health}),
-               {}};
+  const auto fill = [&](detail::RuntimeText& text) {
+    const auto settings = detail::RecordAccess::health(monitor, controller);
+    for (const auto& [name, x] : settings.constants) text.number(name, x);
+    // The limits of a diagnosis are double, whatever the monitor is.
+    const detail::ListWriter in_double(detail::c_language, false);
+    const HealthLimits limits;
+    for (const auto& [name, x] : std::initializer_list<std::pair<const char*, double>>{
+             {"FOR_EVIDENCE", limits.evidence},
+             {"FOR_EVIDENCE_OF_SIGN", limits.evidence_of_sign},
+             {"FOR_OPPOSED", limits.opposed},
+             {"FOR_SIGN_RATIO", limits.sign_ratio},
+             {"FOR_STEADY", limits.steady},
+             {"FOR_STEADY_RATIO", limits.steady_ratio},
+             {"RIGHT_SIGN", -limits.sign_ratio},
+             {"FOR_STANDING", 0.99},
+             {"FOR_WRONG_SIGN", limits.wrong_sign},
+             {"FOR_TOO_SMALL", limits.too_small},
+             {"FOR_RESPONSE", limits.response},
+             {"FOR_TOO_LARGE", limits.too_large},
+             {"NEGATIVE", 0},
+             {"ONCE", 1},
+             {"A_QUARTER", 4},
+             {"OFTEN_LIMITED", 0.05},
+             {"ONE_SIDE", 0.8}}) {
+      text.constant(name, in_double.number(x));
+    }
+    text.count("SIZE", Size);
+    text.count("DIVIDER", static_cast<std::size_t>(settings.divider));
+    text.replace("DESIGN_MEMORY",
+                 std::to_string(static_cast<long long>(S(1) / settings.weight + S(0.5))));
+    text.replace("DESIGN_ROW", std::to_string(Controller::order));
+  };
+  return detail::code_of<S>(options, detail::runtime::health_header, detail::runtime::health, fill);
 }
 
 /// The same as a function block in Structured Text, to be called after that of the controller,

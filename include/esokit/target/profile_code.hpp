@@ -96,66 +96,62 @@ inline ProfileCall profile_call(int sample, double largest) {
 template <int Order, PlainScalar S>
 Expected<CCode, Error<S>> to_c(const SmoothProfile<Order, S>& profile,
                                const CodeOptions& options = {}) {
-  const auto ok = detail::checked_names<S>(
-      options, [&](const CodeOptions& as) { return detail::text_of(to_c(profile, as)); });
-  if (!ok) return ok.error();
-  detail::RuntimeText text(options.name, sizeof(S) == sizeof(float));
-  const auto numbers = detail::RecordAccess::profile(profile);
-  for (int i = 1; i <= Order; ++i) {
-    const auto row = static_cast<std::size_t>(i - 1);
-    const std::string of = std::to_string(i);
-    text.feature("ESOKIT_LIMITED_" + of, numbers.limits[row] > S(0));
-    text.number("ROOT_OF_LIMIT_" + of, numbers.roots_of_limits[row]);
-    text.number("ROOT_OF_PEAK_" + of, numbers.roots_of_peaks[row]);
-  }
-  // The polynomial and its derivatives, as smooth_step has them.
-  constexpr int degree = 2 * Order + 1;
-  std::array<S, static_cast<std::size_t>(degree) + 1> c{};
-  for (int k = 0; k <= Order; ++k) {
-    c[static_cast<std::size_t>(Order + 1 + k)] = static_cast<S>(
-        (k % 2 == 0 ? 1 : -1) * binomial(Order + k, k) * binomial(degree, Order - k));
-  }
-  std::vector<decltype(c)> polynomials;
-  for (int i = 0; i <= Order; ++i) {
-    polynomials.push_back(c);
-    for (std::size_t k = 0; k + 1 < c.size(); ++k) c[k] = static_cast<S>(k + 1) * c[k + 1];
-    c.back() = S(0);
-  }
-  constexpr S largest = (std::numeric_limits<S>::max)();
-  SmoothProfile<Order, S> played = profile;
-  std::vector<std::vector<S>> vectors;
-  for (int k = 0; k < options.self_test_samples; ++k) {
-    const auto call = detail::profile_call(k, static_cast<double>(largest));
-    const S target = static_cast<S>(call.target);
-    const S given = call.is_infinite ? target * largest : target;
-    if (call.resets) {
-      (void)played.reset(given);
-    } else {
-      (void)played.update(given);
+  const auto fill = [&](detail::RuntimeText& text) {
+    const auto numbers = detail::RecordAccess::profile(profile);
+    for (int i = 1; i <= Order; ++i) {
+      const auto row = static_cast<std::size_t>(i - 1);
+      const std::string of = std::to_string(i);
+      text.feature("ESOKIT_LIMITED_" + of, numbers.limits[row] > S(0));
+      text.number("ROOT_OF_LIMIT_" + of, numbers.roots_of_limits[row]);
+      text.number("ROOT_OF_PEAK_" + of, numbers.roots_of_peaks[row]);
     }
-    const auto motion = played.motion();
-    std::vector<S> sample{target,
-                          static_cast<S>((call.is_infinite ? 1 : 0) + (call.resets ? 2 : 0))};
-    for (int i = 0; i <= Order; ++i) sample.push_back(motion(i));
-    vectors.push_back(sample);
-  }
-  text.counts({{"COUNT", polynomials.size()},
-               {"TERMS", c.size()},
-               {"COLUMNS", polynomials.size() + 2},
-               {"SAMPLES", vectors.size()}});
-  text.constant("ORDER", std::to_string(Order));
-  text.number("SAMPLE_TIME", numbers.sample_time);
-  text.number("SHORTEST_TIME", numbers.shortest_time);
-  text.number("LONGER", numbers.longer);
-  text.number("LARGEST", largest);
-  text.number("MOST_SAMPLES", static_cast<S>(1 << 30));
-  text.replace("DESIGN_ROOTS", Order > 2 ? "sqrt and cbrt" : "sqrt");
-  text.lines("DESIGN_ABOUT", options.comment.empty() ? "" : " * " + options.comment + "\n");
-  text.lines("DESIGN_POLYNOMIALS", text.writer().rows(polynomials));
-  text.lines("DESIGN_VECTORS", text.writer().rows(vectors));
-  return CCode{text.header(detail::runtime::profile_header),
-               text.source({detail::runtime::head, detail::runtime::profile}),
-               {}};
+    // The polynomial and its derivatives, as smooth_step has them.
+    constexpr int degree = 2 * Order + 1;
+    std::array<S, static_cast<std::size_t>(degree) + 1> c{};
+    for (int k = 0; k <= Order; ++k) {
+      c[static_cast<std::size_t>(Order + 1 + k)] = static_cast<S>(
+          (k % 2 == 0 ? 1 : -1) * binomial(Order + k, k) * binomial(degree, Order - k));
+    }
+    std::vector<decltype(c)> polynomials;
+    for (int i = 0; i <= Order; ++i) {
+      polynomials.push_back(c);
+      for (std::size_t k = 0; k + 1 < c.size(); ++k) c[k] = static_cast<S>(k + 1) * c[k + 1];
+      c.back() = S(0);
+    }
+    constexpr S largest = (std::numeric_limits<S>::max)();
+    SmoothProfile<Order, S> played = profile;
+    std::vector<std::vector<S>> vectors;
+    for (int k = 0; k < options.self_test_samples; ++k) {
+      const auto call = detail::profile_call(k, static_cast<double>(largest));
+      const S target = static_cast<S>(call.target);
+      const S given = call.is_infinite ? target * largest : target;
+      if (call.resets) {
+        (void)played.reset(given);
+      } else {
+        (void)played.update(given);
+      }
+      const auto motion = played.motion();
+      std::vector<S> sample{target,
+                            static_cast<S>((call.is_infinite ? 1 : 0) + (call.resets ? 2 : 0))};
+      for (int i = 0; i <= Order; ++i) sample.push_back(motion(i));
+      vectors.push_back(sample);
+    }
+    text.counts({{"COUNT", polynomials.size()},
+                 {"TERMS", c.size()},
+                 {"COLUMNS", polynomials.size() + 2},
+                 {"SAMPLES", vectors.size()}});
+    text.constant("ORDER", std::to_string(Order));
+    text.number("SAMPLE_TIME", numbers.sample_time);
+    text.number("SHORTEST_TIME", numbers.shortest_time);
+    text.number("LONGER", numbers.longer);
+    text.number("LARGEST", largest);
+    text.number("MOST_SAMPLES", static_cast<S>(1 << 30));
+    text.replace("DESIGN_ROOTS", Order > 2 ? "sqrt and cbrt" : "sqrt");
+    text.lines("DESIGN_POLYNOMIALS", text.writer().rows(polynomials));
+    text.lines("DESIGN_VECTORS", text.writer().rows(vectors));
+  };
+  return detail::code_of<S>(options, detail::runtime::profile_header, detail::runtime::profile,
+                            fill);
 }
 
 /// A profile as a function block in Structured Text, a call of which is a sample: its C,
@@ -188,50 +184,46 @@ Expected<std::string, Error<S>> to_structured_text(const SmoothProfile<Order, S>
 template <int Order, int Capacity, PlainScalar S>
 Expected<CCode, Error<S>> to_c(const ApproachProfile<Order, Capacity, S>& profile,
                                const CodeOptions& options = {}) {
-  const auto ok = detail::checked_names<S>(
-      options, [&](const CodeOptions& as) { return detail::text_of(to_c(profile, as)); });
-  if (!ok) return ok.error();
-  const auto numbers = detail::RecordAccess::approach(profile);
-  const auto& config = numbers.config;
-  ApproachProfile<Order, Capacity, S> played = profile;
-  (void)played.start(S(0), S(0));
-  constexpr std::size_t count = static_cast<std::size_t>(Order) + 1;
-  std::vector<std::array<S, count + 2>> vectors;
-  for (int k = 0; k < options.self_test_samples; ++k) {
-    const S way = detail::clipped(
-        S(S((k / 40) % 2 == 0 ? 20 : -10) * config.sample_time * numbers.half_speed));
-    (void)played.update(way);
-    std::array<S, count + 2> sample{way, played.feed()};
-    for (int i = 0; i <= Order; ++i) sample[static_cast<std::size_t>(i + 2)] = played.motion()(i);
-    vectors.push_back(sample);
-  }
-  detail::RuntimeText text(options.name, sizeof(S) == sizeof(float));
-  text.features({{"ESOKIT_LAGS", Order == 2},
-                 {"ESOKIT_DELAYED", numbers.delay > 0},
-                 {"ESOKIT_NEGATIVE", config.input_gain < S(0)}});
-  const auto delay = static_cast<std::size_t>(numbers.delay);
-  text.counts({{"COUNT", count},
-               {"DELAY", delay},
-               {"PLACES", delay * count},
-               {"COLUMNS", count + 2},
-               {"SAMPLES", vectors.size()}});
-  text.constant("ORDER", std::to_string(Order));
-  text.number("SAMPLE_TIME", config.sample_time);
-  text.number("POLE", config.pole);
-  text.number("LAG", config.lag);
-  text.number("INPUT_GAIN", config.input_gain);
-  text.number("UPPER", config.limits.upper);
-  text.number("LOWER", config.limits.lower);
-  text.number("MOST", S(S(9) / S(10)));
-  text.number("LEAST", S(numbers.half_speed / S(10)));
-  text.number("BY_BANDWIDTH", S(-numbers.share));
-  text.number("DECAY", numbers.decay);
-  text.number("DIGITS", S(S(8) * detail::rounding<S>()));
-  text.lines("DESIGN_ABOUT", options.comment.empty() ? "" : " * " + options.comment + "\n");
-  text.lines("DESIGN_VECTORS", text.writer().rows(vectors));
-  return CCode{text.header(detail::runtime::approach_header),
-               text.source({detail::runtime::head, detail::runtime::approach}),
-               {}};
+  const auto fill = [&](detail::RuntimeText& text) {
+    const auto numbers = detail::RecordAccess::approach(profile);
+    const auto& config = numbers.config;
+    ApproachProfile<Order, Capacity, S> played = profile;
+    (void)played.start(S(0), S(0));
+    constexpr std::size_t count = static_cast<std::size_t>(Order) + 1;
+    std::vector<std::array<S, count + 2>> vectors;
+    for (int k = 0; k < options.self_test_samples; ++k) {
+      const S way = detail::clipped(
+          S(S((k / 40) % 2 == 0 ? 20 : -10) * config.sample_time * numbers.half_speed));
+      (void)played.update(way);
+      std::array<S, count + 2> sample{way, played.feed()};
+      for (int i = 0; i <= Order; ++i) sample[static_cast<std::size_t>(i + 2)] = played.motion()(i);
+      vectors.push_back(sample);
+    }
+    text.features({{"ESOKIT_LAGS", Order == 2},
+                   {"ESOKIT_DELAYED", numbers.delay > 0},
+                   {"ESOKIT_NEGATIVE", config.input_gain < S(0)}});
+    const auto delay = static_cast<std::size_t>(numbers.delay);
+    text.counts({{"COUNT", count},
+                 {"DELAY", delay},
+                 {"PLACES", delay * count},
+                 {"COLUMNS", count + 2},
+                 {"SAMPLES", vectors.size()}});
+    text.constant("ORDER", std::to_string(Order));
+    text.number("SAMPLE_TIME", config.sample_time);
+    text.number("POLE", config.pole);
+    text.number("LAG", config.lag);
+    text.number("INPUT_GAIN", config.input_gain);
+    text.number("UPPER", config.limits.upper);
+    text.number("LOWER", config.limits.lower);
+    text.number("MOST", S(S(9) / S(10)));
+    text.number("LEAST", S(numbers.half_speed / S(10)));
+    text.number("BY_BANDWIDTH", S(-numbers.share));
+    text.number("DECAY", numbers.decay);
+    text.number("DIGITS", S(S(8) * detail::rounding<S>()));
+    text.lines("DESIGN_VECTORS", text.writer().rows(vectors));
+  };
+  return detail::code_of<S>(options, detail::runtime::approach_header, detail::runtime::approach,
+                            fill);
 }
 
 /// The same as a function block in Structured Text, a call of which is a sample: its C, translated.

@@ -35,39 +35,35 @@ inline constexpr const char* proportioned =
 /// @param output as `make` returned it @return error for the options, as for a controller
 template <PlainScalar S>
 Expected<CCode, Error<S>> to_c(const TimeProportioned<S>& output, const CodeOptions& options = {}) {
-  const auto ok = detail::checked_names<S>(
-      options, [&](const CodeOptions& as) { return detail::text_of(to_c(output, as)); });
-  if (!ok) return ok.error();
-  const auto numbers = detail::RecordAccess::proportioned(output);
-  const S range = numbers.on - numbers.off;
-  TimeProportioned<S> simulated = output;
-  std::vector<std::array<S, 3>> vectors;
-  S u = numbers.off;
-  for (int k = 0; k < options.self_test_samples; ++k) {
-    if (simulated.begins()) {
-      u = detail::clipped(S(numbers.off + range * (S(k % 13) / S(10) - S(1) / S(10))));
+  const auto fill = [&](detail::RuntimeText& text) {
+    const auto numbers = detail::RecordAccess::proportioned(output);
+    const S range = numbers.on - numbers.off;
+    TimeProportioned<S> simulated = output;
+    std::vector<std::array<S, 3>> vectors;
+    S u = numbers.off;
+    for (int k = 0; k < options.self_test_samples; ++k) {
+      if (simulated.begins()) {
+        u = detail::clipped(S(numbers.off + range * (S(k % 13) / S(10) - S(1) / S(10))));
+      }
+      const bool is_on = simulated.update(u);
+      vectors.push_back({u, S(is_on ? 1 : 0), simulated.applied()});
     }
-    const bool is_on = simulated.update(u);
-    vectors.push_back({u, S(is_on ? 1 : 0), simulated.applied()});
-  }
-  detail::RuntimeText text(options.name, sizeof(S) == sizeof(float));
-  text.count("SAMPLES", vectors.size());
-  text.constant("WINDOW", std::to_string(numbers.window));
-  text.constant("SHORTEST", std::to_string(numbers.shortest));
-  text.constant("LONGEST", std::to_string(numbers.longest));
-  text.constant("LAST_SAMPLE", std::to_string(numbers.window - 1));
-  text.constant("BEYOND_LONGEST", std::to_string(numbers.longest + numbers.window));
-  text.number("OFF_VALUE", numbers.off);
-  text.number("ON_VALUE", numbers.on);
-  text.number("RANGE", range);
-  text.number("LOW", range < S(0) ? numbers.on : numbers.off);
-  text.number("HIGH", range < S(0) ? numbers.off : numbers.on);
-  text.number("SAMPLE_TIME", numbers.sample_time);
-  text.lines("DESIGN_ABOUT", options.comment.empty() ? "" : " * " + options.comment + "\n");
-  text.lines("DESIGN_VECTORS", text.writer().rows(vectors));
-  return CCode{text.header(detail::runtime::proportioned_header),
-               text.source({detail::runtime::head, detail::runtime::proportioned}),
-               {}};
+    text.count("SAMPLES", vectors.size());
+    text.constant("WINDOW", std::to_string(numbers.window));
+    text.constant("SHORTEST", std::to_string(numbers.shortest));
+    text.constant("LONGEST", std::to_string(numbers.longest));
+    text.constant("LAST_SAMPLE", std::to_string(numbers.window - 1));
+    text.constant("BEYOND_LONGEST", std::to_string(numbers.longest + numbers.window));
+    text.number("OFF_VALUE", numbers.off);
+    text.number("ON_VALUE", numbers.on);
+    text.number("RANGE", range);
+    text.number("LOW", range < S(0) ? numbers.on : numbers.off);
+    text.number("HIGH", range < S(0) ? numbers.off : numbers.on);
+    text.number("SAMPLE_TIME", numbers.sample_time);
+    text.lines("DESIGN_VECTORS", text.writer().rows(vectors));
+  };
+  return detail::code_of<S>(options, detail::runtime::proportioned_header,
+                            detail::runtime::proportioned, fill);
 }
 
 /// The same as a function block in Structured Text, a call of which is a sample: its C, translated.
