@@ -40,10 +40,9 @@ inline constexpr const char* approach =
 inline constexpr const char* follow_header =
 #include <esokit/target/runtime/follow.h>
     ;
-inline constexpr const char* sum =
-#include <esokit/target/runtime/sum.c>
-    ;
 inline constexpr const char* follow =
+#include <esokit/target/runtime/sum.c>
+// What it adds without rounding is before it.
 #include <esokit/target/runtime/follow.c>
     ;
 }  // namespace runtime
@@ -296,40 +295,35 @@ std::vector<S> follow_sample(FollowProfile<Order, S>& played, int k, S way, S fa
 template <int Order, PlainScalar S>
 Expected<CCode, Error<S>> to_c(const FollowProfile<Order, S>& profile,
                                const CodeOptions& options = {}) {
-  const auto ok = detail::checked_names<S>(
-      options, [&](const CodeOptions& as) { return detail::text_of(to_c(profile, as)); });
-  if (!ok) return ok.error();
-  const auto numbers = detail::RecordAccess::follow(profile);
-  const S fastest = numbers.config.limits[0];
-  const S highest = numbers.config.limits[Order - 1];
-  const S h = numbers.width;
-  const S unit = highest * h * (Order == 1 ? S(1) : h);
-  auto played = FollowProfile<Order, S>::make(numbers.config).value();
-  std::vector<std::vector<S>> vectors;
-  for (int k = 0; k < options.self_test_samples; ++k) {
-    vectors.push_back(detail::follow_sample(played, k, unit, S(highest * h), highest));
-  }
-  constexpr std::size_t count = static_cast<std::size_t>(Order) + 1;
-  detail::RuntimeText text(options.name, sizeof(S) == sizeof(float));
-  text.features({{"ESOKIT_SECOND", Order == 2}, {"ESOKIT_LIMITED", fastest > S(0)}});
-  text.counts({{"COUNT", count}, {"COLUMNS", 2 * count + 1}, {"SAMPLES", vectors.size()}});
-  constexpr S largest = (std::numeric_limits<S>::max)();
-  text.constant("ORDER", std::to_string(Order));
-  text.number("SAMPLE_TIME", numbers.config.sample_time);
-  text.number("HALF_A_SAMPLE", S(numbers.config.sample_time / S(2)));
-  text.number("WIDTH", h);
-  text.number("FASTEST", fastest);
-  text.number("HIGHEST", highest);
-  text.number("UNIT", unit);
-  text.number("LARGEST", largest);
-  text.number("LONGEST", S(largest / S(16)));
-  text.number("DIGITS", S(S(8) * detail::rounding<S>()));
-  text.number("ROUNDING", S(S(8) * detail::rounding<S>() * fastest));
-  text.lines("DESIGN_ABOUT", options.comment.empty() ? "" : " * " + options.comment + "\n");
-  text.lines("DESIGN_VECTORS", text.writer().rows(vectors));
-  return CCode{text.header(detail::runtime::follow_header),
-               text.source({detail::runtime::head, detail::runtime::sum, detail::runtime::follow}),
-               {}};
+  const auto fill = [&](detail::RuntimeText& text) {
+    const auto numbers = detail::RecordAccess::follow(profile);
+    const S fastest = numbers.config.limits[0];
+    const S highest = numbers.config.limits[Order - 1];
+    const S h = numbers.width;
+    const S unit = highest * h * (Order == 1 ? S(1) : h);
+    auto played = FollowProfile<Order, S>::make(numbers.config).value();
+    std::vector<std::vector<S>> vectors;
+    for (int k = 0; k < options.self_test_samples; ++k) {
+      vectors.push_back(detail::follow_sample(played, k, unit, S(highest * h), highest));
+    }
+    constexpr std::size_t count = static_cast<std::size_t>(Order) + 1;
+    text.features({{"ESOKIT_SECOND", Order == 2}, {"ESOKIT_LIMITED", fastest > S(0)}});
+    text.counts({{"COUNT", count}, {"COLUMNS", 2 * count + 1}, {"SAMPLES", vectors.size()}});
+    constexpr S largest = (std::numeric_limits<S>::max)();
+    text.constant("ORDER", std::to_string(Order));
+    text.number("SAMPLE_TIME", numbers.config.sample_time);
+    text.number("HALF_A_SAMPLE", S(numbers.config.sample_time / S(2)));
+    text.number("WIDTH", h);
+    text.number("FASTEST", fastest);
+    text.number("HIGHEST", highest);
+    text.number("UNIT", unit);
+    text.number("LARGEST", largest);
+    text.number("LONGEST", S(largest / S(16)));
+    text.number("DIGITS", S(S(8) * detail::rounding<S>()));
+    text.number("ROUNDING", S(S(8) * detail::rounding<S>() * fastest));
+    text.lines("DESIGN_VECTORS", text.writer().rows(vectors));
+  };
+  return detail::code_of<S>(options, detail::runtime::follow_header, detail::runtime::follow, fill);
 }
 
 /// The same as a function block in Structured Text, a call of which is a sample: its C, translated.
@@ -337,33 +331,32 @@ Expected<CCode, Error<S>> to_c(const FollowProfile<Order, S>& profile,
 template <int Order, PlainScalar S>
 Expected<std::string, Error<S>> to_structured_text(const FollowProfile<Order, S>& profile,
                                                    const CodeOptions& options = {}) {
-  const auto code = to_c(profile, options);
-  if (!code) return code.error();
-  const auto new_names = detail::new_names_in_block<S>(
-      options, [&](const CodeOptions& as) { return to_structured_text(profile, as); });
-  if (!new_names) return new_names.error();
-  detail::StBlock block(*code, options, sizeof(S) == sizeof(float), "_init");
-  block.input("target : $real", "where to be now, and its derivatives, or zeros");
-  for (int i = 1; i <= Order; ++i) block.input("target" + std::to_string(i) + " : $real");
-  block.input("y : $real", "if starts");
-  if (Order == 2) block.input("speed : $real", "if starts");
-  block.input("starts : BOOL", "TRUE: it is at y with this speed, before the sample");
-  block.input("waits : BOOL", "TRUE: the axis cannot go on, r comes to rest");
-  block.output("started : BOOL", "FALSE: not finite or too large, nothing changed");
-  block.output("good : BOOL", "FALSE: target is not finite or too large, the last one goes on");
-  block.own("wanted : $name_numbers_" + std::to_string(Order + 1));
-  block.body =
-      std::string("started := FALSE;\nIF starts THEN\n  started := $name_start(o := o, y := y, ") +
-      (Order == 2 ? "speed := speed" : "speed := 0.0") + ");\nEND_IF;\nwanted[0] := target;\n";
-  for (int i = 1; i <= Order; ++i) {
-    const std::string row = std::to_string(i);
-    block.body += "wanted[" + row + "] := target" + row + ";\n";
-  }
-  block.body +=
-      "IF waits THEN\n  good := TRUE;\n  done := $name_wait(o := o);\nELSE\n"
-      "  good := $name_update(o := o, target := wanted);\nEND_IF;\n";
-  detail::put_motion(block, Order);
-  return detail::block_of_profile(block, detail::RecordAccess::follow(profile).config.sample_time);
+  const auto add = [](detail::StBlock& block) {
+    block.input("target : $real", "where to be now, and its derivatives, or zeros");
+    for (int i = 1; i <= Order; ++i) block.input("target" + std::to_string(i) + " : $real");
+    block.input("y : $real", "if starts");
+    if (Order == 2) block.input("speed : $real", "if starts");
+    block.input("starts : BOOL", "TRUE: it is at y with this speed, before the sample");
+    block.input("waits : BOOL", "TRUE: the axis cannot go on, r comes to rest");
+    block.output("started : BOOL", "FALSE: not finite or too large, nothing changed");
+    block.output("good : BOOL", "FALSE: target is not finite or too large, the last one goes on");
+    block.own("wanted : $name_numbers_" + std::to_string(Order + 1));
+    block.body =
+        std::string(
+            "started := FALSE;\nIF starts THEN\n  started := $name_start(o := o, y := y, ") +
+        (Order == 2 ? "speed := speed" : "speed := 0.0") + ");\nEND_IF;\nwanted[0] := target;\n";
+    for (int i = 1; i <= Order; ++i) {
+      const std::string row = std::to_string(i);
+      block.body += "wanted[" + row + "] := target" + row + ";\n";
+    }
+    block.body +=
+        "IF waits THEN\n  good := TRUE;\n  done := $name_wait(o := o);\nELSE\n"
+        "  good := $name_update(o := o, target := wanted);\nEND_IF;\n";
+    detail::put_motion(block, Order);
+  };
+  return detail::block_of<S>(
+      options, [&](const CodeOptions& as) { return to_c(profile, as); }, "_init", "profile",
+      detail::once_in_each(detail::RecordAccess::follow(profile).config.sample_time), add);
 }
 
 }  // namespace esokit
