@@ -8,6 +8,7 @@
 #include <esokit/target/detail/runtime_text.hpp>
 #include <esokit/target/detail/writable.hpp>
 #include <string>
+#include <vector>
 
 namespace esokit {
 
@@ -33,15 +34,17 @@ std::string text_of(const Code& made) {
 /// @param fill gives their text the features, constants and lines
 template <class S, class Fill>
 Expected<CCode, Error<S>> code_of(const CodeOptions& options, const char* header,
-                                  const char* source, const Fill& fill) {
+                                  const std::vector<const char*>& sources, const Fill& fill) {
   const auto ok = checked_names<S>(options, [&](const CodeOptions& as) {
-    return text_of(code_of<S>(as, header, source, fill));
+    return text_of(code_of<S>(as, header, sources, fill));
   });
   if (!ok) return ok.error();
   RuntimeText text(options.name, sizeof(S) == sizeof(float));
   text.lines("DESIGN_ABOUT", options.comment.empty() ? "" : " * " + options.comment + "\n");
   fill(text);
-  return CCode{text.header(header), text.source({runtime::head, source}), {}};
+  std::vector<const char*> files{runtime::head};
+  files.insert(files.end(), sources.begin(), sources.end());
+  return CCode{text.header(header), text.source(files), {}};
 }
 
 /// The texts; settings bear a mark of what else is in them.

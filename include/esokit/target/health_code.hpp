@@ -85,7 +85,8 @@ requires std::same_as<S, typename Controller::scalar_type> Expected<CCode, Error
                  std::to_string(static_cast<long long>(S(1) / settings.weight + S(0.5))));
     text.replace("DESIGN_ROW", std::to_string(Controller::order));
   };
-  return detail::code_of<S>(options, detail::runtime::health_header, detail::runtime::health, fill);
+  return detail::code_of<S>(options, detail::runtime::health_header, {detail::runtime::health},
+                            fill);
 }
 
 /// The same as a function block in Structured Text, to be called after that of the controller,

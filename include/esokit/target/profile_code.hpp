@@ -40,9 +40,10 @@ inline constexpr const char* approach =
 inline constexpr const char* follow_header =
 #include <esokit/target/runtime/follow.h>
     ;
-inline constexpr const char* follow =
+inline constexpr const char* sum =
 #include <esokit/target/runtime/sum.c>
-// What it adds without rounding is before it.
+    ;
+inline constexpr const char* follow =
 #include <esokit/target/runtime/follow.c>
     ;
 }  // namespace runtime
@@ -149,7 +150,7 @@ Expected<CCode, Error<S>> to_c(const SmoothProfile<Order, S>& profile,
     text.lines("DESIGN_POLYNOMIALS", text.writer().rows(polynomials));
     text.lines("DESIGN_VECTORS", text.writer().rows(vectors));
   };
-  return detail::code_of<S>(options, detail::runtime::profile_header, detail::runtime::profile,
+  return detail::code_of<S>(options, detail::runtime::profile_header, {detail::runtime::profile},
                             fill);
 }
 
@@ -221,7 +222,7 @@ Expected<CCode, Error<S>> to_c(const ApproachProfile<Order, Capacity, S>& profil
     text.number("DIGITS", S(S(8) * detail::rounding<S>()));
     text.lines("DESIGN_VECTORS", text.writer().rows(vectors));
   };
-  return detail::code_of<S>(options, detail::runtime::approach_header, detail::runtime::approach,
+  return detail::code_of<S>(options, detail::runtime::approach_header, {detail::runtime::approach},
                             fill);
 }
 
@@ -323,7 +324,8 @@ Expected<CCode, Error<S>> to_c(const FollowProfile<Order, S>& profile,
     text.number("ROUNDING", S(S(8) * detail::rounding<S>() * fastest));
     text.lines("DESIGN_VECTORS", text.writer().rows(vectors));
   };
-  return detail::code_of<S>(options, detail::runtime::follow_header, detail::runtime::follow, fill);
+  return detail::code_of<S>(options, detail::runtime::follow_header,
+                            {detail::runtime::sum, detail::runtime::follow}, fill);
 }
 
 /// The same as a function block in Structured Text, a call of which is a sample: its C, translated.

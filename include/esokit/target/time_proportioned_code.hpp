@@ -63,7 +63,7 @@ Expected<CCode, Error<S>> to_c(const TimeProportioned<S>& output, const CodeOpti
     text.lines("DESIGN_VECTORS", text.writer().rows(vectors));
   };
   return detail::code_of<S>(options, detail::runtime::proportioned_header,
-                            detail::runtime::proportioned, fill);
+                            {detail::runtime::proportioned}, fill);
 }
 
 /// The same as a function block in Structured Text, a call of which is a sample: its C, translated.

@@ -637,6 +637,7 @@ static real called(esokit_state *o, unsigned call, const real given[COLUMNS], un
   } else if (kind == CALL_RESTS) {
     while (left > 0u) {
       result = esokit_update(o, r, DESIGN_SAMPLE_R);
+      *status = o->status;
       left = left - 1u;
     }
 #endif
