@@ -158,7 +158,9 @@ TEST(Health, ADeadTimeIsNoGainThatIsTooLarge) {
       // Without the delays of the hold and the divider, 3 samples: 3 T w = 0.04.
       EXPECT_NEAR(monitor.health().gain_ratio, 1 + (std::conj(phi) * psi).real() / std::norm(phi),
                   0.04 * std::abs(ratio));
-      if (ratio > 0) EXPECT_EQ(accused, latency == 0.0 && ratio < 2) << ratio << ' ' << latency;
+      if (ratio > 0) {
+        EXPECT_EQ(accused, latency == 0.0 && ratio < 2) << ratio << ' ' << latency;
+      }
       EXPECT_EQ(diagnose(monitor.health()), ratio < 0 ? LoopFault::wrong_sign : LoopFault::none);
     }
   }

@@ -108,7 +108,7 @@ typedef double real;
 #define SAMPLES 1
 #define CALLS 1
 #define CALL_LATER 0u
-#define DESIGN_CALLS 0u
+#define DESIGN_CALLS {0u, 0u}
 #if ESOKIT_MOVES
 #define DESIGN_R real r, real r1, real r2
 #define DESIGN_R_GIVEN r, r1, r2
@@ -119,8 +119,8 @@ typedef double real;
 #define DESIGN_R_IS_FINITE is_finite(r) && is_finite(r1) && is_finite(r2)
 #define DESIGN_R_STANDS stands(r1) && stands(r2)
 #define DESIGN_SAMPLE_R r, given[2], given[3]
-#define DESIGN_VECTORS {number(0.0), number(0.0), number(0.0), number(0.0), number(0.0), number(0.0)}
-#define COLUMNS 6u
+#define DESIGN_VECTORS {number(0.0), number(0.0), number(0.0), number(0.0), number(0.0)}
+#define COLUMNS 5u
 #else
 #define DESIGN_R real r
 #define DESIGN_R_GIVEN r
@@ -129,8 +129,8 @@ typedef double real;
 #define DESIGN_R_AT_REST y
 #define DESIGN_R_IS_FINITE is_finite(r)
 #define DESIGN_SAMPLE_R r
-#define DESIGN_VECTORS {number(0.0), number(0.0), number(0.0), number(0.0)}
-#define COLUMNS 4u
+#define DESIGN_VECTORS {number(0.0), number(0.0), number(0.0)}
+#define COLUMNS 3u
 #endif
 #define ROWS 1u
 #define STATES 3u

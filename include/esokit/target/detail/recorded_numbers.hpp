@@ -221,8 +221,9 @@ struct RecordedDesign {
   bool softens = false;
   bool compensates = false;                    ///< r is the output of another controller
   bool predictive = false;                     ///< in two phases
-  std::vector<std::vector<double>> samples{};  ///< y, r or u, result, status
-  std::vector<unsigned> test_calls{};          ///< what of it is called, see self_test.hpp
+  std::vector<std::vector<double>> samples{};  ///< y, r or u, and the result
+  /// What of it is called, see self_test.hpp, and the status then.
+  std::vector<std::array<unsigned, 2>> test_calls{};
 
   /// The mode in which it begins.
   [[nodiscard]] unsigned mode() const { return rest.rests ? 3 : loop.hold_left > 0 ? 1 : 0; }

@@ -198,11 +198,11 @@ void take_self_test(RecordedDesign& design, double law, Calls&& calls, Output&& 
     if ((plan.bad & bad_beside) != 0) beside(0) = beside(0) * largest;
     const TestResult<V> result = calls(plan.call, y, beside, row);
     sample.push_back(static_cast<double>(result.number));
-    sample.push_back(static_cast<double>(result.status));
     design.samples.push_back(std::move(sample));
     if (k < most_calls) {
-      design.test_calls.push_back(static_cast<unsigned>(plan.call) + plan.bad +
-                                  of_row * static_cast<unsigned>(row));
+      design.test_calls.push_back(
+          {static_cast<unsigned>(plan.call) + plan.bad + of_row * static_cast<unsigned>(row),
+           result.status});
     }
     if (plan.call == TestCall::starts) plant.rest();
     plant.advance(static_cast<double>(output(beside)));

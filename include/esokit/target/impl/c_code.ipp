@@ -418,8 +418,9 @@ class CDesign {
     text_.replace("esokit_DESIGN_SET", options.name + "_" + options.settings_name);
     text_.replace("DESIGN_LAST", std::to_string(d.size - 1));
     text_.lines("DESIGN_VECTORS", writer_.rows(d.samples));
-    text_.replace("DESIGN_CALLS",
-                  listed(d.test_calls, [](unsigned call) { return std::to_string(call) + "u"; }));
+    text_.replace("DESIGN_CALLS", listed(d.test_calls, [](const auto& call) {
+                    return "{" + std::to_string(call[0]) + "u, " + std::to_string(call[1]) + "u}";
+                  }));
   }
 
   /// What the reference is: r, or with its motion.
@@ -452,15 +453,15 @@ class CDesign {
                                       : names.size() > 1
                                           ? "the reference, with its derivatives r1, .."
                                           : "the reference");
-    text_.constant("COLUMNS", std::to_string(names.size() + 3) + "u");
+    text_.constant("COLUMNS", std::to_string(names.size() + 2) + "u");
     text_.replace("DESIGN_SAMPLE_R", counted(d.references(), [](int i) {
                     return i == 0 ? "r" : "given[" + std::to_string(i + 1) + "]";
                   }));
     text_.replace(
         "DESIGN_COLUMNS",
         !d.predictive && !d.is_controller
-            ? "y, u, the disturbance, status"
-            : "y, " + listed(d.references(d.predictive ? "next r" : "r"), itself) + ", u, status");
+            ? "y, u, the disturbance"
+            : "y, " + listed(d.references(d.predictive ? "next r" : "r"), itself) + ", u");
   }
   std::string recovery() const {
     return listed(design_.recovery, [](unsigned due) { return std::to_string(due) + "u"; });
