@@ -253,6 +253,32 @@ TYPED_TEST(Applied, ABadReportIsReported) {
   }
 }
 
+/// Nor after a start under a u that the limits of then did not hold: a NaN made it the output.
+TYPED_TEST(Applied, ARefusedReportChangesNothing) {
+  using S = typename TypeParam::scalar_type;
+  for (const S rate : {S(100), Limits<S>{}.rate}) {
+    for (const S u : {S(-1.6), S(3)}) {
+      for (const bool starts : {false, true}) {
+        Setting<S> setting;
+        setting.limits = {.lower = S(0), .upper = S(5), .rate = rate};
+        Any<TypeParam> c(setting);
+        if (starts) c.start(S(0.1), u);
+        setting.limits = {.lower = S(-4), .upper = S(1), .rate = rate};
+        c.retune(setting);
+        Any<TypeParam> other = c;
+        EXPECT_EQ(c.applied(hidden_nan<S>()), StepStatus::input_rejected);
+        EXPECT_TRUE(same_bits(c.output(), other.output())) << u << ' ' << rate << ' ' << starts;
+        for (int k = 0; k < 4; ++k) {
+          EXPECT_TRUE(same_bits(c.update(S(0.1), S(0.2)), other.update(S(0.1), S(0.2))))
+              << u << ' ' << rate << ' ' << starts << ' ' << k;
+          c.end_of_sample(S(0.2));
+          other.end_of_sample(S(0.2));
+        }
+      }
+    }
+  }
+}
+
 /// The operator's u is the last command.
 TYPED_TEST(Applied, StartGoesOnFromTheOperatorsInput) {
   using S = typename TypeParam::scalar_type;

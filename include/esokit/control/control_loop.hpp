@@ -230,14 +230,13 @@ class ControlLoop {
     u = select(good, u, limiter_.last());
     if (!(elsewhere_ == false)) [[unlikely]] {
       S command = output();
-      if constexpr (lane_count<S> == 1) {
-        command = requested_ = u;
-      } else {
-        for (int i = 0; i < lane_count<S>; ++i) {
-          if (elsewhere_[i]) command[i] = requested_[i] = u[i];
-        }
+      bool taken = false;
+      for (int i = 0; i < lane_count<S>; ++i) {
+        if (!detail::of_lane(elsewhere_, i) || !detail::of_lane(good, i)) continue;
+        detail::of_lane(command, i) = detail::of_lane(requested_, i) = detail::of_lane(u, i);
+        taken = true;
       }
-      limiter_.track(command);
+      if (taken) limiter_.track(command);
     }
     limiter_.applied(u);
     return detail::unless<S>(good, StepStatus::input_rejected);

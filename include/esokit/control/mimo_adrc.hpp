@@ -130,12 +130,12 @@ requires(...&& detail::shifts_disturbance<Observers>()) class MimoAdrc {
     const bool theirs = (special_ & elsewhere) != 0;
     for (int i = 0; i < channels; ++i) {
       auto& limiter = limiters_[static_cast<std::size_t>(i)];
-      if (!is_finite(u(i))) status = StepStatus::input_rejected;
-      const S held = is_finite(u(i)) ? u(i) : limiter.last();
-      if (theirs) {
-        limiter.track(held);
-      } else {
-        limiter.applied(held, is_told());
+      const bool good = is_finite(u(i));
+      if (!good) status = StepStatus::input_rejected;
+      if (!theirs) {
+        limiter.applied(good ? u(i) : limiter.last(), is_told());
+      } else if (good) {
+        limiter.track(u(i));
       }
     }
     if (!theirs) special_ |= told;
