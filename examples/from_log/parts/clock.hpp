@@ -82,6 +82,8 @@ struct ClockRead {
   bool whole = false;    ///< all are whole numbers
   bool counter = false;  ///< it began anew: no date
   bool steady = true;    ///< no jitter: a grid, from which rows may be missing
+  int more_digits = 0;   ///< that the first has, and the steps between rows have not
+  bool rounded = false;  ///< steps differ by the last digit only
   double rounder = 0;    ///< s, of min, h or day: in this unit the numbers have fewer digits
 
   Pace pace = Pace::unknown;
@@ -178,6 +180,12 @@ inline bool usual_rows(double T, Pace pace) {
   return T > 0.09 && (T < 60.5 || (slow(T) && T < 3601));
 }
 
+/// A mantissa of rows of a clock in minutes or hours, of less than one of them.
+inline bool chosen_part(double seconds) {
+  const double mantissa = seconds / std::pow(10.0, std::floor(std::log10(seconds) + 1e-9));
+  return one_of(mantissa, {1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 7.5, 8, 10}, 4e-4);
+}
+
 /// Whether a clock of fractions from zero may have this unit, and not seconds.
 inline bool rival(const ClockRead& read, double unit) {
   const double T = read.step * unit;
@@ -185,6 +193,8 @@ inline bool rival(const ClockRead& read, double unit) {
   if (unit < 0.5) return read.pace != Pace::slow && unit > 0.5e-3 && T > 0.49e-4 && T < 1;
   // Of a temperature, rows of ms in seconds are less likely than usual ones in minutes or hours.
   if (read.pace == Pace::slow && !usual_rows(read.step, read.pace)) return usual_rows(T, read.pace);
+  // What is no step of a log in seconds.
+  if (unit > 1.5 && !fast(read.step) && read.step < 1.0 / 60) return chosen_part(T);
   // Minutes count what is a second apart, hours and days a minute.
   const double least = unit > 3599 ? 60 : 1;
   return read.pace != Pace::quick && unit > 1.5 && T > 0.99 * least;
@@ -203,6 +213,23 @@ inline double rounder_unit(const std::vector<double>& values) {
   return 0.0;
 }
 
+/// The step from stamp to stamp: the mean of those that are not gaps.
+inline double usual_step(const std::vector<double>& stamps) {
+  std::vector<double> steps;
+  for (std::size_t k = 1; k < stamps.size(); ++k) {
+    if (stamps[k] > stamps[k - 1]) steps.push_back(stamps[k] - stamps[k - 1]);
+  }
+  if (steps.empty()) return 0.0;
+  const auto at = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), at, steps.end());
+  const double middle = *at;
+  double sum = 0, count = 0;
+  for (const double step : steps) {
+    if (step > 0.4 * middle && step < 1.6 * middle) sum += step, ++count;
+  }
+  return sum / count;
+}
+
 /// Whether stamps lie on a grid, from which some may be missing.
 inline bool is_steady(const std::vector<double>& stamps, double step) {
   std::size_t off = 0;
@@ -213,6 +240,39 @@ inline bool is_steady(const std::vector<double>& stamps, double step) {
   return 20 * off < stamps.size();
 }
 
+/// The numbers of a column.
+/// @param origin added to each
+/// @param counter it began anew
+inline ClockRead read_clock(const std::vector<double>& stamps, double origin, bool counter,
+                            Pace pace) {
+  std::vector<double> numbers = stamps;
+  for (double& number : numbers) number += origin;
+  ClockRead read{.first = numbers.front(),
+                 .last = numbers.back(),
+                 .step = usual_step(stamps),
+                 .whole = detail::grain_of(numbers, 1.0, 0.0) >= 1.0,
+                 .counter = counter,
+                 .pace = pace};
+  if (!(read.step > 0)) return read;
+  read.steady = is_steady(stamps, read.step);
+  if (read.whole) return read;
+  read.rounder = rounder_unit(numbers);
+  const double grain = detail::grain_of(numbers, 1.0, 0.0);
+  // Where double ends, digits are none of the file's.
+  const double digit = std::max(grain, 4e-16 * std::abs(read.last));
+  const double of_step = detail::grain_of({read.step}, 1.0, 0.05 * digit);
+  while (read.more_digits < 9 && of_step > 9 * digit * std::pow(10.0, read.more_digits))
+    ++read.more_digits;
+  double low = 0, high = 0;
+  const double step = (stamps.back() - stamps.front()) / static_cast<double>(stamps.size() - 1);
+  for (std::size_t k = 0; k < stamps.size(); ++k) {
+    const double off = stamps[k] - stamps[0] - step * static_cast<double>(k);
+    low = std::min(low, off), high = std::max(high, off);
+  }
+  read.rounded = high - low > 0.4 * grain && high - low < 2.1 * grain && step < 20 * grain;
+  return read;
+}
+
 namespace detail {
 
 /// Fractions from zero. Most logs count seconds so; an alarm where another unit is as even.
@@ -221,13 +281,24 @@ inline ClockVerdict judge_fractions(const ClockRead& read, const std::vector<dou
   const auto any = [&](auto&& is) { return std::any_of(clocks.begin(), clocks.end(), is); };
   const bool seconds = any([](double unit) { return unit > 0.5 && unit < 1.5; });
   if (!seconds || read.step > 60.5 || read.step < 0.45e-4 || read.rounder > 0) return found;
+  // A clock of seconds whose rows are so even begins with as few digits.
+  if (read.steady && read.more_digits > 1 &&
+      any([&](double unit) { return unit > 1.5 && chosen_part(read.step * unit); }))
+    return found;
+  // Nor do rows of a second or more begin a tenth of a second later.
+  if (read.steady && read.more_digits > 0 && read.step > 0.9995 && read.pace != Pace::slow)
+    return found;
   const bool even = three_digits(read.step) || chosen(read.step);
   if (!even && any([&](double unit) { return unit > 1.5 && chosen(read.step * unit); }))
     return found;
   found.unit = 1;
   found.doubtful = any([&](double unit) { return rival(read, unit); });
+  // 0.000266667 is 1/3750 s, or 0.016 s in minutes.
+  found.doubtful = found.doubtful || (read.steady && !even && any([&](double unit) {
+                                        return unit > 1.5 && three_digits(read.step * unit);
+                                      }));
   // From 1 on these are as often ms of a clock of us: 1.003, 2.006 of a sketch.
-  found.doubtful = found.doubtful || read.step > 0.9995;
+  found.doubtful = found.doubtful || read.step > 0.9995 || (read.rounded && read.step > 0.0495);
   if (read.step < 0.9995 || read.pace == Pace::slow) return found;
   if (read.pace == Pace::unknown && read.steady && even) return found;
   found.unit = read.pace == Pace::quick && usual_rows(read.step * 1e-3, read.pace) ? 1e-3 : 0;
@@ -260,6 +331,36 @@ inline ClockVerdict judge_counter(const ClockRead& read, const std::vector<doubl
   const bool rows = std::abs(read.step - 1) < 0.01 || read.first < -0.5;
   if (read.pace == Pace::unknown || rows || usual.size() != 1) return found;
   return read.last * usual[0] < 2 * 86400 ? take(usual[0]) : found;
+}
+
+/// Rows of what has a date.
+enum class Rows {
+  usual,
+  rare,       ///< a counter that has run for days may have them
+  of_counter  ///< and one of hours, too
+};
+/// Rows of 25 min since 1970 are as rare as those of 1.5 ms that a counter of us has in this hour.
+inline Rows rows_of_date(const ClockRead& read, double unit, const std::vector<double>& clocks) {
+  const double T = read.step * unit;
+  if (unit > 86399) {  // some weeks in minutes are a date of a spreadsheet
+    if (!read.steady || chosen_part(T) || std::none_of(clocks.begin(), clocks.end(), [&](double c) {
+          return c > 1.5 && chosen_part(read.step * c);
+        }))
+      return Rows::usual;
+    return one_of(T, {90, 900, 1800, 3600}, 0.004) ? Rows::rare : Rows::of_counter;
+  }
+  const bool by_the_clock = read.whole || !read.steady;
+  if (T < 60.5 ||
+      (by_the_clock && one_of(T, {90, 120, 180, 240, 300, 600, 900, 1200, 1800, 3600}, 0.004)))
+    return Rows::usual;
+  Rows found = Rows::usual;
+  for (const double other : clocks) {
+    if (!read.whole && other < 0.9e-3) continue;  // us have no fractions
+    if (read.step * other < 0.45e-3 || !chosen(read.step * other)) continue;
+    if (read.last * other < 2 * 86400) return Rows::of_counter;
+    found = Rows::rare;
+  }
+  return found;
 }
 
 }  // namespace detail
@@ -305,11 +406,20 @@ inline ClockVerdict judge_clock(const ClockRead& read) {
     const bool another =
         small_number ? read.whole || !slow(T) || (read.step >= shortest && three_digits(read.step))
                      : !clocks.empty() && T > 60.5;
-    if (!another && !started) return take(unit, true, date == Date::seldom && runs);
+    const bool in_minutes = small_number && unit < 86399;
+    const Rows rows = in_minutes || !slow(T) ? Rows::usual : rows_of_date(read, unit, clocks);
+    if (rows == Rows::of_counter) return found;
+    const bool doubtful = date == Date::seldom || rows == Rows::rare;
+    if (!another && !started) return take(unit, true, doubtful && runs);
     if (!started && (small_number || slow(T) == any_fast())) return found;
-    if (!started && slow(T)) return take(unit, true, date == Date::seldom);
+    if (!started && slow(T)) return take(unit, true, doubtful);
   }
   const bool dated = !dates.empty();
+  if (dated && !read.whole) {
+    const bool even = three_digits(read.step) || chosen(read.step);
+    if (read.steady && read.more_digits > 1) return found;
+    if (!even && chosen(read.step * dates[0])) return found;
+  }
   found = read.whole ? judge_counter(read, clocks, std::move(found))
                      : judge_fractions(read, clocks, std::move(found));
   found.doubtful = found.doubtful || dated;
@@ -359,23 +469,6 @@ inline ClockRepair unwrap_counter(std::vector<double>& stamps) {
     return found;
   }
   return found;
-}
-
-/// The step from stamp to stamp: the mean of those that are not gaps.
-inline double usual_step(const std::vector<double>& stamps) {
-  std::vector<double> steps;
-  for (std::size_t k = 1; k < stamps.size(); ++k) {
-    if (stamps[k] > stamps[k - 1]) steps.push_back(stamps[k] - stamps[k - 1]);
-  }
-  if (steps.empty()) return 0.0;
-  const auto at = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), at, steps.end());
-  const double middle = *at;
-  double sum = 0, count = 0;
-  for (const double step : steps) {
-    if (step > 0.4 * middle && step < 1.6 * middle) sum += step, ++count;
-  }
-  return sum / count;
 }
 
 /// Stamps that are repeated or rounded: put at equal steps, if none of them is then off by more

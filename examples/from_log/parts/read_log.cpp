@@ -731,16 +731,8 @@ Input read_log(const Settings& settings) {
   input.merged = topics();
   mend_stamps(settings, file, input, stamps);
   const double origin = file.stamps().origin();
-  std::vector<double> numbers = stamps;
-  for (double& number : numbers) number += origin;
-  ClockRead clock{.first = origin,
-                  .last = numbers.back(),
-                  .step = usual_step(stamps),
-                  .whole = detail::grain_of(numbers, 1.0, 0.0) >= 1.0,
-                  .counter = input.counter,
-                  .pace = kind == nullptr ? Pace::unknown : kind->pace};
-  clock.steady = is_steady(stamps, clock.step);
-  if (!clock.whole) clock.rounder = rounder_unit(numbers);
+  const ClockRead clock =
+      read_clock(stamps, origin, input.counter, kind == nullptr ? Pace::unknown : kind->pace);
   if (!(clock.step > 0.0) && stamps.size() < 2)
     throw LogError(settings.file + ": the log has one row only: record at least 200");
   if (!(clock.step > 0.0)) {
