@@ -261,7 +261,9 @@ inline ClockRead read_clock(const std::vector<double>& stamps, double origin, bo
   // Where double ends, digits are none of the file's.
   const double digit = std::max(grain, 4e-16 * std::abs(read.last));
   const double of_step = detail::grain_of({read.step}, 1.0, 0.05 * digit);
-  while (read.more_digits < 9 && of_step > 9 * digit * std::pow(10.0, read.more_digits))
+  const double off_grid = std::abs(std::remainder(read.first, of_step));
+  while (off_grid > 0.5 * digit && read.more_digits < 9 &&
+         of_step > 9 * digit * std::pow(10.0, read.more_digits))
     ++read.more_digits;
   double low = 0, high = 0;
   const double step = (stamps.back() - stamps.front()) / static_cast<double>(stamps.size() - 1);
