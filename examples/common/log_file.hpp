@@ -857,17 +857,18 @@ class LogFile {
     if (field.empty() || field.size() > 12) return std::nullopt;
     std::string text(field);
     for (char& c : text) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c;
-    for (const std::string_view one : {"on", "true", "ein", "yes"}) {
+    for (const std::string_view one : {"on", "true", "ein", "an", "yes", "high", "wahr", "vrai"}) {
       if (text == one) return 1.0;
     }
-    for (const std::string_view zero : {"off", "false", "aus", "no"}) {
+    for (const std::string_view zero : {"off", "false", "aus", "no", "low", "falsch", "faux"}) {
       if (text == zero) return 0.0;
     }
     for (const std::string_view lost :
-         {"err",   "error",       "fail",    "failed",  "fault",       "bad", "invalid",
-          "ovf",   "ol",          "-",       "--",      "---",         "?",   "#value!",
-          "#ref!", "#div/0!",     "#num!",   "missing", "n/a",         "na",  "nil",
-          "none",  "unavailable", "unknown", "timeout", "disconnected"}) {
+         {"err",     "error",   "fail",        "failed",  "fault",    "bad",
+          "invalid", "ovf",     "ol",          "-",       "--",       "---",
+          "?",       "#value!", "#ref!",       "#div/0!", "#num!",    "missing",
+          "n/a",     "na",      "nil",         "none",    "overflow", "overrange",
+          "\\n",     "--.-",    "unavailable", "unknown", "timeout",  "disconnected"}) {
       if (text == lost) return std::numeric_limits<double>::quiet_NaN();
     }
     return std::nullopt;

@@ -486,7 +486,7 @@ healthy units.csv
 written t,y,u , 'sprintf("%.3e", t)' 'if ($2 !~ /e/) $2 = $2 "D+00"; if (NR % 31 == 7) $2 = "ERR";' | sed '2,$s/e\([-+]\)/D\1/g' >fortran.csv
 named 'an error instead of a number' fortran.csv
 servo relay=1 >rows.txt
-written 'time,pv,sp,output' , t '$3 = ($3 > 0 ? "ON" : "OFF") s $3;' | sed '1s/sp,output/output,x/' >switched.csv
+written 'time,pv,sp,output' , t '$3 = ($3 > 0 ? (NR % 2 ? "ON" : "WAHR") : NR % 2 ? "OFF" : "faux") s $3;' | sed '1s/sp,output/output,x/' >switched.csv
 truth=100 named "ON or true is 1" switched.csv --time-unit s
 [[ $said == *"'output' was taken for u"* ]]
 verdict $? "switched.csv: nothing is said of output: $said"

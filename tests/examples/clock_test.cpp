@@ -253,6 +253,24 @@ TEST(Clock, ExamplesByValueAndStep) {
   EXPECT_EQ(unit(1.5e9, 100), 0);  // 0.1 ms of a counter, or 100 s since 1970
 }
 
+// 102059, 102100 and 0.59, 1.00: between them is a second.
+TEST(Clock, SixtiesInOneNumberAreNoTime) {
+  for (const double T : {0.01, 0.5, 1.0, 7.0}) {
+    std::vector<double> clock, minutes, seconds, bursts;
+    for (int k = 0; k * T < 300; ++k) {
+      const double t = 30 + k * T, minute = std::floor(t / 60);
+      clock.push_back(102000 + 100 * minute + (t - 60 * minute));
+      minutes.push_back((100 * minute + (t - 60 * minute)) / 100);
+      seconds.push_back(t);
+      if (std::fmod(t, 100) < 50) bursts.push_back(t);
+    }
+    EXPECT_EQ(from_log::row_of_sixty(clock), static_cast<std::size_t>(std::ceil(30 / T))) << T;
+    EXPECT_EQ(from_log::row_of_sixty(minutes), static_cast<std::size_t>(std::ceil(30 / T))) << T;
+    EXPECT_EQ(from_log::row_of_sixty(seconds), 0U) << T;
+    EXPECT_EQ(from_log::row_of_sixty(bursts), 0U) << T;
+  }
+}
+
 TEST(Clock, CountersThatBeginAnewRiseAgain) {
   for (const double turn : {65536.0, 4294967296.0}) {
     std::vector<double> stamps, rising;

@@ -428,6 +428,31 @@ inline ClockVerdict judge_clock(const ClockRead& read) {
   return found;
 }
 
+/// A time of day, or minutes and seconds, in one number: 102059 is followed by 102100, 0.59
+/// by 1.00.
+/// @return the row in which a minute begins; 0: none
+inline std::size_t row_of_sixty(const std::vector<double>& numbers) {
+  for (const double scale : {1.0, 100.0}) {
+    std::size_t found = 0;
+    double last = 0, seconds = 0;
+    bool all = true;
+    for (std::size_t k = 0; k < numbers.size() && all; ++k) {
+      const double value = numbers[k] * scale + 1e-6, now = std::fmod(value, 100.0);
+      const double step = value - last;
+      all = now < 60 && now > -1e-9;
+      if (k > 0 && now < seconds) {
+        // As far apart as the rows before, if a minute had 60 s.
+        const double before = k > 1 ? (numbers[k - 1] - numbers[k - 2]) * scale : 0;
+        all = all && std::abs(step - 40 - before) < 0.6 * before + 1e-6 && before < 30;
+        found = found > 0 ? found : k;
+      }
+      last = value, seconds = now;
+    }
+    if (all && found > 0) return found;
+  }
+  return 0;
+}
+
 /// What had to be done to stamps so that they rise.
 struct ClockRepair {
   double turn = 0;           ///< after which the counter began anew; 0: it did not

@@ -246,10 +246,22 @@ std::string increment_of(const LogFile& file) {
   return "";
 }
 
+/// Hours, minutes and seconds in one number have a hole of 40 in each minute.
+void refuse_sixties(const Settings& settings, const LogFile& file, std::vector<double> stamps,
+                    const std::string& column) {
+  for (double& stamp : stamps) stamp += file.stamps().origin();
+  const std::size_t row = row_of_sixty(stamps);
+  if (row == 0) return;
+  throw LogError(settings.file + ": after " + number_text(stamps[row - 1], 15) + ", " + column +
+                 " goes on with " + number_text(stamps[row], 15) +
+                 ": are these minutes and seconds in one number? Write 10:20:59, or set the time "
+                 "from row to row: --sample-time SECONDS. If time really jumps, set --time-unit");
+}
+
 /// Finds the unit of the stamps: as given, by the column's name, the line of units or what stands
 /// behind the numbers, else by value and step. What stays open is asked for.
 double find_unit(const Settings& settings, const LogFile& file, const ClockRead& clock,
-                 Input& input) {
+                 const std::vector<double>& stamps, Input& input) {
   if (settings.sample_time > 0.0) return settings.sample_time / clock.step;
   if (!settings.time_unit.empty()) {
     const double unit = seconds_of(lower(settings.time_unit));
@@ -258,6 +270,7 @@ double find_unit(const Settings& settings, const LogFile& file, const ClockRead&
                    "' is none of day, h, min, s, ms, us, 100ns, ns");
   }
   const std::string column = "column " + input.time;
+  refuse_sixties(settings, file, stamps, column);
   double named = seconds_of(words(input.time).back());
   if (named == 0.0) named = seconds_of(split_words(lower(file.below(2))).front());
   if (named == 0.0) named = seconds_of(lower(file.cell_unit(2)));
@@ -742,7 +755,8 @@ Input read_log(const Settings& settings) {
                    "--sample-time SECONDS");
   }
   // Dates and times of day are read in seconds.
-  const double unit = file.stamps().numbers() ? find_unit(settings, file, clock, input) : 1.0;
+  const double unit =
+      file.stamps().numbers() ? find_unit(settings, file, clock, stamps, input) : 1.0;
   input.time_unit = settings.sample_time > 0.0 ? "rows" : unit_name(unit);
   for (double& stamp : stamps) stamp *= unit;
   input.log.time = std::move(stamps);
