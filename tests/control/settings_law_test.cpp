@@ -13,6 +13,7 @@
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/control/predictive_adrc.hpp>
+#include <esokit/control/resting.hpp>
 #include <esokit/gain/pole_set.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
@@ -186,6 +187,13 @@ TEST(Settings, OfControllersAreAdopted) {
   using Plain = Adrc<LinearEso<1>>;
   every_setting_is_adopted(
       "Adrc", {of<Plain>(), of<Plain>(by_gains), of<Plain>(softly), of<Plain>(unsaid)}, {11, 12});
+  using Rests = Resting<Plain>;
+  every_setting_is_adopted("Resting",
+                           {of<Rests>(), of<Rests>([](auto& c) { by_gains(c.controller); }),
+                            of<Rests>([](auto& c) { softly(c.controller); }),
+                            of<Rests>([](auto& c) { unsaid(c.controller); }),
+                            of<Rests>([](auto& c) { c.rest = {}; })},  // takes a divider
+                           {11, 12});
   using Predictive = PredictiveAdrc<LinearEso<2>>;
   every_setting_is_adopted("PredictiveAdrc",
                            {of<Predictive>(), of<Predictive>(by_gains), of<Predictive>(unsaid)});

@@ -368,6 +368,14 @@ class Filler {
     }
     MEMBER(observer, fill(member))
     MEMBER(observers, fill(member))
+    MEMBER(controller, fill(member))
+    if constexpr (requires { config.rest.error; }) {
+      if (!tape_.once_in(4, "no rest")) {
+        config.controller.measurement_divider = 1;
+        number("rest.error", config.rest.error, {0.01, 2, true});
+        if (tape_.once_in(2)) number("rest.time", config.rest.time, {0, 60 * T});
+      }
+    }
     MEMBER(curve, curve(member))
     if constexpr (requires { config.curve, config.observer.leak_time; }) {
       // The plant has no curve: there is something to leak, or that is beyond the bound.

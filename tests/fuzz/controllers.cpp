@@ -11,6 +11,7 @@
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/control/predictive_adrc.hpp>
+#include <esokit/control/resting.hpp>
 #include <esokit/gain/pole_set.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
@@ -33,6 +34,7 @@ void add_controllers(std::vector<Kind>& kinds) {
   KIND(Adrc<LinearEso<1, double>, ErrorBased>);
   KIND(Adrc<WrappedOutput<LinearEso<2, float>>, ErrorBased>);
   KIND(Adrc<VariableTime<LinearEso<2, float>>>);
+  KIND(Resting<Adrc<WrappedOutput<LinearEso<2, float>>>>);
   KIND(DisturbanceCompensator<LinearEso<2, float>>);
   KIND(PredictiveAdrc<CascadeEso<1, 2, double>>);
   KIND(PredictiveAdrc<AdjustableBandwidthEso<2, float>>);
@@ -43,6 +45,9 @@ void add_controllers(std::vector<Kind>& kinds) {
   KIND(Adrc<Measured<VariableTime<LinearEso<1, double>>, 1, 3>>);
   KIND(PredictiveAdrc<Measured<LinearEso<2, double>, 1, 3>>);
   KIND(Adrc<Guarded<LinearEso<2, float>>>);
+  KIND(Resting<Adrc<Guarded<LinearEso<1, double>>, ErrorBased>>);
+  KIND(Resting<Adrc<OutlierGate<LinearEso<2, double>>>>);
+  KIND(Resting<Adrc<VariableTime<LinearEso<1, double>>>>);
   KIND(Adrc<MappedInput<LinearEso<2, float>, 4>>);
   KIND(Adrc<MappedInput<Guarded<DelayedInput<LinearEso<1, double>, 3>>, 4>, ErrorBased>);
   KIND(DisturbanceCompensator<MappedInput<LinearEso<1, double>, 4>>);

@@ -3,6 +3,7 @@
 /// of observers.cpp, controllers.cpp or laws.cpp; a member with a new name by a line here.
 #pragma once
 
+#include <algorithm>
 #include <esokit/adapter/guarded.hpp>
 #include <esokit/control/control_loop.hpp>
 #include <esokit/control/experiment.hpp>
@@ -119,6 +120,8 @@ class Driver final : public Game {
   static const auto& innermost(const C& config) {
     if constexpr (requires { config.observer; }) {
       return innermost(config.observer);
+    } else if constexpr (requires { config.controller.observer; }) {
+      return innermost(config.controller);
     } else {
       return config;
     }
@@ -193,7 +196,7 @@ class Driver final : public Game {
   void put_out(S u, S from) {
     elsewhere_ = false;
     if (!is_finite(u)) return fail("u is not finite");
-    check_limits(config_.limits, u, from);
+    check_limits(of_loop().limits, u, from);
   }
 
   template <class L>
@@ -213,6 +216,22 @@ class Driver final : public Game {
     }
   }
 
+  /// The settings of the controller in a Resting, or of itself.
+  [[nodiscard]] const auto& of_loop() const {
+    if constexpr (requires { config_.controller; }) {
+      return config_.controller;
+    } else {
+      return config_;
+    }
+  }
+  [[nodiscard]] bool too_soon() const {
+    if constexpr (requires { object_->too_soon(); }) {
+      return object_->too_soon();
+    } else {
+      return false;
+    }
+  }
+
   [[nodiscard]] S step_time() const {
     if constexpr (requires(const T& o) { o.observer().step_time(); }) {
       return object_->observer().step_time();
@@ -228,6 +247,8 @@ class Driver final : public Game {
       return config.sample_time;
     } else if constexpr (requires { config.observer; }) {
       return config_time(config.observer);
+    } else if constexpr (requires { config.controller; }) {
+      return config_time(config.controller);
     } else {
       return config_time(std::get<0>(config.observers));
     }
@@ -344,8 +365,8 @@ class Driver final : public Game {
   }
 
   [[nodiscard]] bool measurement_due() const {
-    if constexpr (requires { config_.measurement_divider; })
-      return config_.measurement_divider == 1;
+    if constexpr (requires { of_loop().measurement_divider; })
+      return of_loop().measurement_divider == 1;
     else
       return true;
   }
@@ -356,6 +377,17 @@ class Driver final : public Game {
     S from = object_->output();
     // What the actuator reports is no command, unless something else commands it.
     if (elsewhere_ && u_applied != nullptr && is_finite(*u_applied)) from = *u_applied;
+    soon_ = too_soon();
+    if (soon_) {  // no sample
+      remember();
+      const S u = quietly(call);
+      if (u_applied == nullptr && changed()) fail("too little time has passed, and it changes");
+      // What something else commands may be outside the limits.
+      const S kept = std::clamp(from, of_loop().limits.lower, of_loop().limits.upper);
+      if (u < kept || u > kept || !same(u, object_->output()))
+        fail("too little time has passed, and u changes");
+      return;
+    }
     elsewhere_ = false;
     const S u = quietly(call);
     put_out(u, from);
@@ -377,12 +409,13 @@ class Driver final : public Game {
 
   void judge_mode() {
     const int missed = object_->observer().missed();
-    const int divider = config_.measurement_divider;
+    const auto& config = of_loop();
+    const int divider = config.measurement_divider;
     const LoopMode mode = object_->mode();
-    if (missed >= (config_.missing.most + 1) * divider && mode != LoopMode::safe) {
+    if (missed >= (config.missing.most + 1) * divider && mode != LoopMode::safe) {
       fail("too many measurements are missing, and the mode is not safe");
     }
-    if (mode == LoopMode::safe && missed < divider && !config_.missing.stay && measurement_due()) {
+    if (mode == LoopMode::safe && missed < divider && !config.missing.stay && measurement_due()) {
       fail("measurements are there, and the mode is safe");
     }
   }
@@ -545,6 +578,16 @@ class Driver final : public Game {
           d.refusable([&] { return d.object_->set_step_time(seconds); });
         });
       }
+      if constexpr (requires(T & o, S s) { o.elapsed(s); }) {
+        add(a, "elapsed", [](Driver& d) {
+          const double t = d.promise_.sample_time;
+          const bool is_long = d.tape_->once_in(4);
+          const S seconds = d.number({0, is_long ? 100 * t : 2 * t});
+          d.refusable([&] { return d.object_->elapsed(seconds); });
+          if ((is_finite(seconds) && seconds >= S(0)) != d.accepted_ && d.calm_)
+            d.fail("elapsed takes a bad time, or refuses one");
+        });
+      }
       // A controller's.
       if constexpr (!takes_applied_input && requires(T & o, S s) {
                       { o.update(s, s) } -> std::same_as<S>;
@@ -572,6 +615,19 @@ class Driver final : public Game {
             if constexpr (reports_reference) d.referred(is_finite(r));
           });
         }
+      }
+      if constexpr (requires(const Config& config) { config.rest.error; }) {
+        add(a, "update at the reference", [](Driver& d) {
+          const S r = d.number({-1, 1});
+          for (int left = d.tape_->choice(120); left > 0; --left) {
+            const bool rested = d.object_->mode() == LoopMode::rest;
+            const S u = d.object_->output();
+            d.control(&r, nullptr, [&] { return d.object_->update(r, r); });
+            d.referred(is_finite(r));
+            if (rested && d.object_->mode() == LoopMode::rest && !same(u, d.object_->output()))
+              d.fail("it rests, and u changes");
+          }
+        });
       }
       if constexpr (TakesReferences<T>) {
         add(a, "update(y, references)", [](Driver& d) {
@@ -716,7 +772,7 @@ class Driver final : public Game {
 
   /// A reference that cannot be followed is reported at each sample.
   void referred(bool fine) {
-    if (!fine && !has(object_->status(), StepStatus::reference_rejected)) {
+    if (!fine && !soon_ && !has(object_->status(), StepStatus::reference_rejected)) {
       fail("a bad reference is not reported");
     }
   }
@@ -1059,10 +1115,16 @@ class Driver final : public Game {
   // ------------------------------------------------------------------ the way back
   /// Good samples of a plant at rest.
   void recover() override {
+    if constexpr (requires { object_->set_step_time(S(1)); }) {
+      (void)object_->set_step_time(config_time(config_));  // also what `elapsed` keeps is over
+    } else if constexpr (requires { object_->elapsed(S(1)); }) {
+      (void)object_->elapsed(config_time(config_));
+    }
     if constexpr (
         requires { T::channels; } || requires { T::outputs; }) {
       recover_several();
-    } else if constexpr (requires(const T& o) { o.controller(); }) {
+    } else if constexpr (
+        requires(const T& o) { o.controller(); } && !requires(const T& o) { o.mode(); }) {
       // Its controller has been looked at.
     } else if constexpr (requires(T & o, S s) {
                            { o.update(s, s) } -> std::same_as<StepStatus>;
@@ -1098,8 +1160,10 @@ class Driver final : public Game {
           [&](const S& y) {
             object_->applied(S(0));
             (void)object_->update(y, y);
-            return object_->mode() == LoopMode::running ? object_->status()
-                                                        : StepStatus::prediction_dropped;
+            const LoopMode mode = object_->mode();
+            return mode == LoopMode::running || mode == LoopMode::rest
+                       ? object_->status()
+                       : StepStatus::prediction_dropped;
           },
           [&](const S& y) {
             // The error-based form is fed r - y.
@@ -1117,6 +1181,8 @@ class Driver final : public Game {
   static S config_gain(const C& config) {
     if constexpr (requires { config.input_gain; }) {
       return config.input_gain;
+    } else if constexpr (requires { config.controller; }) {
+      return config_gain(config.controller);
     } else {
       return config_gain(config.observer);
     }
@@ -1191,6 +1257,7 @@ class Driver final : public Game {
 
   Config config_{};
   bool elsewhere_ = false;  ///< u is commanded by something else
+  bool soon_ = false;       ///< too little time has passed for a sample
   std::optional<T> object_{};
   std::optional<T> twin_{};
 };

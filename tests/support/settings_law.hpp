@@ -76,6 +76,8 @@ class Signals {
 template <class Config>
 void fill(Config& config) {
   if constexpr (requires { config.observer; }) fill(config.observer);
+  if constexpr (requires { config.controller; }) fill(config.controller);
+  if constexpr (requires { config.rest.error; }) config.rest = {.error = 3, .time = 0.03};
   if constexpr (requires { config.observers; }) {
     std::apply([](auto&... each) { ((fill(each), each.input_gain = 0), ...); }, config.observers);
     config.controller_bandwidths.fill(4);
@@ -222,6 +224,14 @@ void step_controller(C& o, Signals& in, Played& out) {
       return in.u<S>();
     }
   };
+  // One that stands lets a controller rest.
+  const auto r = [&] {
+    if constexpr (requires(const typename C::Config& config) { config.rest.error; }) {
+      return in.random.index(50) == 0 ? in.u<S>() : S(0);
+    } else {
+      return u();
+    }
+  };
   if constexpr (requires { o.set_step_time(in.u<S>()); }) {
     constexpr double lengths[] = {1, 1, 1.3, 0.6, 2.2, 4.5, 0.22};
     if (in.random.index(3) == 0) {
@@ -267,12 +277,12 @@ void step_controller(C& o, Signals& in, Played& out) {
     put(out, o.prepare(in.u<S>()));
   } else if (what < 12) {
     const auto measured = y();
-    const auto reference = u();
+    const auto reference = r();
     if constexpr (requires { o.applied(u()); }) o.applied(u());
     put(out, o.update(measured, reference));
   } else {
     const auto measured = y();
-    put(out, o.update(measured, u()));
+    put(out, o.update(measured, r()));
   }
   ESOKIT_ANSWER(output)
   ESOKIT_ANSWER(requested)

@@ -192,6 +192,8 @@ requires(detail::goes_into_a_loop<Observer>()) class DisturbanceCompensator {
   [[nodiscard]] StatusOf<S> status() const noexcept { return loop_.status(); }
   /// Whether u is determined by u0 + K dhat, the start hold or the rule for missing measurements.
   [[nodiscard]] Lanes<LoopMode, S> mode() const noexcept { return loop_.mode(); }
+  /// Whether too little time has passed for a sample, see `elapsed`: `update` changes nothing.
+  [[nodiscard]] bool too_soon() const noexcept { return loop_.too_soon(); }
 
  private:
   friend struct detail::LaneAccess;

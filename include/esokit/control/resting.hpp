@@ -187,6 +187,7 @@ requires(detail::can_rest<Controller>()) class Resting {
   [[nodiscard]] const Limiter<S>& limiter() const noexcept { return controller_.limiter(); }
   [[nodiscard]] StatusOf<S> status() const noexcept { return controller_.status(); }
   [[nodiscard]] LoopMode mode() const noexcept { return controller_.mode(); }
+  [[nodiscard]] bool too_soon() const noexcept { return controller_.too_soon(); }
   /// @}
 
  private:
