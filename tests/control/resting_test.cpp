@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <esokit/adapter/guarded.hpp>
 #include <esokit/adapter/mapped_input.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/variable_time.hpp>
@@ -345,7 +346,6 @@ TEST(Resting, KeepsTheOrderOfALoop) {
   EXPECT_EQ(c.mode(), LoopMode::running);
 }
 
-/// An angle by the shorter way; any time between samples; lanes.
 /// What the observer rejects is no measurement: a spike before a gate ends no rest, and an absurd
 /// y, which is wrapped to anywhere, neither ends nor begins one.
 template <class Observer>
@@ -387,6 +387,44 @@ TEST(Resting, WhatIsRejectedIsNoMeasurement) {
   rejects<LinearEso<2>>(eso, {1.7e308});
 }
 
+/// What only a guarded observer has: held by something else it does not rest, and begins anew
+/// after; another b0 is no end of a rest, and counts from then on.
+TEST(Resting, HeldByABrakeAndWithAnotherGain) {
+  using Held = Resting<Adrc<Guarded<LinearEso<2>>>>;
+  for (const double sign : {1.0, -1.0}) {
+    Held::Config settings{};
+    settings.controller.observer.observer = config().controller.observer;
+    settings.controller.observer.observer.input_gain = sign * 50;
+    settings.controller.controller_bandwidth = 20;
+    settings.rest = {.error = 0.25, .time = 2 * T};
+    auto c = Held::make(settings).value();
+    const auto rests_after = [&](int samples) {
+      for (int k = 0; k < samples; ++k) {
+        EXPECT_EQ(c.mode(), LoopMode::running) << k;
+        c.update(1, 1);
+      }
+      EXPECT_EQ(c.mode(), LoopMode::rest);
+    };
+    c.start(1, 0.5);
+    rests_after(4);  // the first has another reference than the start
+    const double held = c.output();
+    EXPECT_FALSE(c.set_input_gain(0));
+    EXPECT_FALSE(c.set_input_gain(hidden_nan<double>()));
+    ASSERT_TRUE(c.set_input_gain(sign * 100));
+    EXPECT_EQ(c.mode(), LoopMode::rest);
+    for (int k = 0; k < 500; ++k) EXPECT_EQ(c.update(1, 1), held);
+    EXPECT_NEAR(c.observer().total_disturbance(), -sign * 100 * held, 1e-3);
+    const double d = c.observer().total_disturbance();
+    for (int k = 0; k < 20; ++k) {
+      EXPECT_EQ(c.hold(1, 1, 2), 2);  // a brake
+      EXPECT_EQ(c.mode(), LoopMode::running);
+    }
+    EXPECT_NEAR(c.observer().total_disturbance(), d, 1e-9 * std::abs(d));
+    rests_after(3);
+  }
+}
+
+/// An angle by the shorter way; any time between samples; lanes.
 TEST(Resting, AroundAdaptersAndInLanes) {
   using Turning = Resting<Adrc<WrappedOutput<VariableTime<LinearEso<2>>>>>;
   auto c = Turning::make(
