@@ -4,6 +4,7 @@
 #include <esokit/adapter/mapped_input.hpp>
 #include <esokit/adapter/measured.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
+#include <esokit/adapter/variable_time.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/resting.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
@@ -112,6 +113,60 @@ TEST(CResting, BeginsWhereTheObjectIs) {
     }
   }
   EXPECT_TRUE(rested[0] && rested[1]);
+}
+
+/// VariableTime is not written. What the header of to_c says to do in its place after a pause is
+/// what `elapsed` does: to the bit, where T is a power of two.
+TEST(CResting, APauseIsPredictedByHand) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  using Any = Rests<VariableTime<LinearEso<2, double>>>;
+  for (const double b0 : {8.0, -8.0}) {
+    Axis::Config settings = config<Axis>(b0);
+    settings.controller.observer.sample_time = 0.0078125;
+    settings.controller.start_hold = {};
+    settings.controller.limits.rate = Limits<>{}.rate;
+    settings.controller.soften = false;
+    settings.controller.missing = {.most = 100};
+    settings.rest = {};  // each call is a command, which a rest that begins then would hold
+    Any::Config any{};
+    any.controller.observer = {.observer = settings.controller.observer, .ratio = 1.5};
+    any.controller.controller_bandwidth = settings.controller.controller_bandwidth;
+    any.controller.limits = settings.controller.limits;
+    any.controller.missing = settings.controller.missing;
+    any.rest = settings.rest;
+    ASSERT_EQ(refusal(Any::make(any)), "accepted");
+    auto mine = Any::make(any).value();
+    const Folder folder;
+    InC<double> in_c(folder, to_c(Axis::make(settings).value(), {.name = "loop"}).value(), true);
+    ASSERT_TRUE(in_c.loaded());
+    Random random(1905);
+    double y = 0, v = 0, u = 0, r = 0;
+    int pauses = 0, restarts = 0;
+    for (int k = 0; k < 3000; ++k) {
+      const int samples = random.index(9) == 0 ? 2 + random.index(40) : 1;
+      if (random.index(200) == 0) r = random.uniform(-1, 1);
+      for (int i = 0; i < samples; ++i) {
+        v += 0.0078125 * (b0 * u + 0.5 - v);
+        y += 0.0078125 * v;
+      }
+      ASSERT_TRUE(mine.elapsed(samples * 0.0078125));
+      for (int i = 1; i < samples; ++i) {
+        in_c.applied(u);
+        (void)in_c.miss(r);
+      }
+      in_c.applied(u);
+      const double next = in_c.update(y, r);
+      u = mine.update(y, r);
+      compare_estimates(mine.observer(), in_c, k);
+      // Its law is computed in other units.
+      ASSERT_NEAR(u, next, 1e-14) << k << ", " << samples;
+      ASSERT_EQ(in_c.probe() / 512 % 128, static_cast<unsigned>(mine.mode())) << k;
+      pauses += samples > 1 ? 1 : 0;
+      restarts += has(mine.status(), StepStatus::restarted) ? 1 : 0;
+    }
+    EXPECT_GT(pauses, 100);
+    EXPECT_GT(restarts, 10);
+  }
 }
 
 /// The self-test comes to rest, and sees a wrong count.

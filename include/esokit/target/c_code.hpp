@@ -89,8 +89,10 @@ CCode c_code(const RecordedDesign& design);
 /// std::sin;`. A branch on a value does not compile: `select(condition, a, b)` chooses.
 ///
 /// Not VariableTime: a step of another length designs the observer anew. Write the observer of a
-/// fixed T; after a pause of k T call `name_update_without_measurement` k - 1 times, then
-/// `name_update`.
+/// fixed T. After a pause of k T call k - 1 times `name_applied(&o, u)`, with the u that was held,
+/// and `name_update_without_measurement`; then `name_applied(&o, u)` and `name_update`. The
+/// estimate is that of `elapsed`, and so is u. But each call counts as a command, which a limit of
+/// rate goes on from and a rest holds, and as a missing sample.
 ///
 /// SmoothProfile, ApproachProfile and FollowProfile, TimeProportioned, HealthMonitor:
 /// target/profile_code.hpp, target/time_proportioned_code.hpp and target/health_code.hpp.
@@ -117,7 +119,7 @@ void to_c(const Other&, const CodeOptions& = {}) {
   static_assert(!detail::TakesAnyTime<Other>,
                 "esokit: to_c does not write VariableTime, whose steps of another length design "
                 "the observer anew: write it of a fixed T, and after a pause of k T call "
-                "update_without_measurement k - 1 times before update");
+                "update_without_measurement k - 1 times before update, and applied(u) before each");
   static_assert(detail::knows_in_general<Other>,
                 "esokit: to_c records the function of a KnownModel: it has to be generic, template "
                 "<class E> auto operator()(const E& x) const noexcept, in numbers of the "
