@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 #include <esokit/adapter/known_model.hpp>
+#include <esokit/analysis/disturbance_alarm.hpp>
 #include <esokit/analysis/loop.hpp>
 #include <esokit/analysis/loop_response.hpp>
 #include <esokit/gain/model_gain.hpp>
@@ -216,6 +217,24 @@ TEST(LinearController, OfEveryAdapter) {
   expect_adrc<VariableTime<LinearEso<2>>>({.observer = linear});
   expect_adrc<VariableTime<DelayedInput<LinearEso<2>, 2>>>(
       {.observer = {.observer = linear, .delay = 2}});
+}
+
+/// While it does not rest, it is the controller.
+TEST(LinearController, OfOneThatMayRest) {
+  const auto rests = [&](double time) {
+    return Resting<Adrc<LinearEso<2>>>::make(
+               {.controller = {.observer = linear, .controller_bandwidth = 4.0},
+                .rest = {.error = 1e-3, .time = time}})
+        .value();
+  };
+  expect_is_linear(rests(100.0));
+  const auto plant = LinearPlant<2>::chain({.input_gain = 2.5}).value();
+  const auto there =
+      disturbance_alarm(plant, rests(0.1), {.load = 1, .noise = {.measurement = {1e-3}}});
+  ASSERT_TRUE(there.has_value()) << there;
+  const auto plain = disturbance_alarm(plant, rests(0.1).controller(),
+                                       {.load = 1, .noise = {.measurement = {1e-3}}});
+  EXPECT_EQ(there->threshold, plain->threshold);
 }
 
 TEST(LinearController, OfGuardsWithTheB0OfNow) {

@@ -26,6 +26,7 @@
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/control/predictive_adrc.hpp>
+#include <esokit/control/resting.hpp>
 #include <utility>
 #include <vector>
 
@@ -36,9 +37,9 @@ namespace esokit {
 template <class T>
 concept AnalysedObserver = detail::SaysObserver<T>;
 
-/// A controller that can be analysed: Adrc, PredictiveAdrc or DisturbanceCompensator with an
-/// AnalysedObserver, MimoAdrc, ObserverWithLaw, Compensated, a LinearController, or
-/// your own type with a function `linear_controller` in its namespace.
+/// A controller that can be analysed: Adrc (also in Resting), PredictiveAdrc or
+/// DisturbanceCompensator with an AnalysedObserver, MimoAdrc, ObserverWithLaw, Compensated, a
+/// LinearController, or your own type with a function `linear_controller` in its namespace.
 template <class T>
 concept AnalysedController = detail::SaysController<T>;
 
@@ -233,6 +234,13 @@ requires detail::SaysObserver<Observer> Expected<LinearController, Error<double>
   const double input_gain = error_based ? -observer.input_gain : observer.input_gain;
   return detail::feedback_of(observer, detail::law_weights(controller.gains(), input_gain),
                              error_based);
+}
+
+/// Resting: the controller while it does not rest.
+template <class Controller>
+requires detail::SaysController<Controller> Expected<LinearController, Error<double>>
+linear_controller(const Resting<Controller>& controller) {
+  return linear_controller(controller.controller());
 }
 
 /// PredictiveAdrc: the same law in two phases.
