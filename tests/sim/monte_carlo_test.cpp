@@ -11,6 +11,7 @@
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
+#include <esokit/control/resting.hpp>
 #include <esokit/core/packed.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/model_eso.hpp>
@@ -441,7 +442,15 @@ struct Own : LinearEso<2> {
 /// The lanes in which runs go, whose numbers are those of single runs.
 template <class C>
 int lanes_of(void (*settings)(typename C::Config&) = nullptr) {
-  typename C::Config config{};
+  typename C::Config all{};
+  auto& config = [&all]() -> auto& {
+    if constexpr (requires { all.controller; }) {
+      return all.controller;
+    } else {
+      return all;
+    }
+  }
+  ();
   auto& chain = chain_config<std::remove_cvref_t<decltype(std::declval<const C&>().observer())>>(
       config.observer);
   chain.observer_bandwidth = 80;
@@ -449,13 +458,13 @@ int lanes_of(void (*settings)(typename C::Config&) = nullptr) {
   chain.sample_time = T;
   config.limits = {.lower = -6, .upper = 6};
   if constexpr (requires { config.controller_bandwidth; }) config.controller_bandwidth = 12;
-  if (settings != nullptr) settings(config);
+  if (settings != nullptr) settings(all);
   std::vector<double> numbers;
   const sim::MonteCarloConfig<Servo, C> study{
       .runs = 6,
       .loop = {.duration = 0.06, .reference = 0.5, .disturbance = 3.0, .noise = 1e-3},
       .on_run = [&](std::int64_t, std::span<const double> n) { numbers.push_back(n[0]); }};
-  const auto runs = sim::monte_carlo(servo(), C::make(config).value(), study);
+  const auto runs = sim::monte_carlo(servo(), C::make(all).value(), study);
   const auto outcome = runs.template run<4>(sim::final_value("y", error)).value();
   EXPECT_EQ(outcome.failed, 0);
   for (std::size_t i = 0; i < numbers.size(); ++i) {
@@ -477,6 +486,8 @@ TEST(MonteCarlo, AsksEveryControllerForPacks) {
   EXPECT_EQ(lanes_of<Adrc<Guarded<LinearEso<2>>>>(), 1);
   EXPECT_EQ((lanes_of<Adrc<DelayedInput<LinearEso<2>, 4>>>()), 4);
   EXPECT_EQ(lanes_of<Adrc<VariableTime<LinearEso<2>>>>(), 1);
+  const auto near = [](auto& config) { config.rest = {.error = 0.3, .time = 4 * T}; };
+  EXPECT_EQ(lanes_of<Resting<Adrc<LinearEso<2>>>>(near), 1);
   EXPECT_EQ(lanes_of<Adrc<OutlierGate<LinearEso<2>>>>(), 1);
   EXPECT_EQ((lanes_of<Adrc<PlantEso<2, ModelParts{.order = 2}>>>(
                 [](auto& config) { config.observer.model.plant = servo(); })),
