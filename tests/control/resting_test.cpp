@@ -99,6 +99,37 @@ TEST(Resting, EndsTheLimitCycleOfStiction) {
   comes_to_rest<float>();
 }
 
+/// Of any stiction, and after a ramp of load: a band of the error at which it sticks while it hunts
+/// ends that. Below it some go on.
+TEST(Resting, ABandOfTheHuntingEndsIt) {
+  Random random(70127);
+  int hunt = 0;
+  constexpr int axes = 12;
+  for (int i = 0; i < axes; ++i) {
+    const double b0 = i % 2 == 0 ? 50 : -50, coulomb = random.uniform(8, 30);
+    const double more = coulomb * random.uniform(0.1, 2);
+    const double omega_c = random.uniform(10, 25), omega_o = omega_c * random.uniform(4, 10);
+    const Joint begun{
+        .stick = coulomb + more, .coulomb = coulomb, .b0 = b0 * random.uniform(0.8, 1.2)};
+    const double ramp = random.log_uniform(10, 300) * (random.index(2) == 0 ? 1 : -1);
+    const auto hunts = [&](double error) {
+      auto settings = config(error, 5 / omega_c);
+      settings.controller.observer.observer_bandwidth = omega_o;
+      settings.controller.observer.input_gain = b0;
+      settings.controller.controller_bandwidth = omega_c;
+      auto axis = Axis<>::make(settings).value();
+      Joint joint = begun;
+      run(axis, joint, 8000);
+      run(axis, joint, static_cast<int>(200 / std::abs(ramp) / T), 0.9995, ramp);
+      run(axis, joint, 8000);
+      return run(axis, joint, 2000).way > 0;
+    };
+    EXPECT_FALSE(hunts(std::max(1.5 * count, more / (omega_o * omega_c)))) << i;
+    hunt += hunts(1.5 * count) ? 1 : 0;
+  }
+  EXPECT_GT(hunt, axes / 4);
+}
+
 /// Without it, it is the controller: to the bit.
 TEST(Resting, IsOffByDefault) {
   auto with = Axis<>::make({.controller = config().controller}).value();
