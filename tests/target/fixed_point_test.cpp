@@ -826,6 +826,20 @@ TEST(FixedPoint, RefusesWhatIsNotLinear) {
                       .max_gap = 2};
   EXPECT_NE(refused(Predictive::make(cascade).value()).find("is PredictiveAdrc"),
             std::string::npos);
+  // Around an observer that can be written alone.
+  using Settling = Adrc<AlgebraicEso<2>>;
+  auto loop = Settling::make({.observer = {.observer_bandwidth = 100,
+                                           .frequency_shift = 50,
+                                           .input_gain = 50,
+                                           .sample_time = 1e-3},
+                              .controller_bandwidth = 20,
+                              .limits = {-6, 6}})
+                  .value();
+  EXPECT_NE(refused(loop).find("has gains that go on"), std::string::npos);
+  for (int k = 0; k < 100000 && !loop.observer().settled(); ++k) (void)loop.update(0.0, 0.0);
+  EXPECT_NE(refused(loop).find("estimates that are published apart (AlgebraicEso)"),
+            std::string::npos)
+      << refused(loop);
 }
 
 /// Settings that do not fit into the scales, or whose bound is above what is allowed, or of another
