@@ -22,7 +22,10 @@ class StParser {
   void read(const std::string& text) {
     split(text);
     tokens_.resize(tokens_.size() + 3);  // at_ never goes beyond the first
-    while (at_ + 3 < tokens_.size()) item();
+    while (at_ + 3 < tokens_.size()) {
+      function_ = {};
+      declaration();
+    }
     std::string structs;
     for (const Function& each : structs_) {
       structs += "TYPE " + each.name + " :\n  STRUCT\n";
@@ -43,7 +46,7 @@ class StParser {
   struct Value {
     std::string text{}, type{};
     bool lazy = false;          ///< only where C evaluates it: a change, a place, a difference
-    bool is_one = true;         ///< needs no brackets
+    bool has_sign = false;      ///< of an operator
     bool by_reference = false;  ///< of a function with VAR_IN_OUT
     bool brackets = false;      ///< around it, where it is an operand
     [[nodiscard]] std::string operand() const { return brackets ? "(" + text + ")" : text; }
@@ -171,23 +174,9 @@ class StParser {
 
   // ---- The file: types, tables, functions.
 
-  void item() {
-    const std::string comment = tokens_[at_].before;
-    function_ = {};
-    if (take("extern")) return skip_behind(";");
-    if (take("typedef")) return structure();
-    (void)take("static");
-    const Variable head = declarator();
-    if (peek() == "=") return table(head);
-    function_.name = of_this(head.name);
-    function_.type = head.type;
-    function(comment);
-  }
-
   void structure() {
     Function one;
-    expect("struct");
-    expect("{");
+    skip_behind("{");
     while (to_.error.empty() && !take("}")) {
       one.variables.push_back(declarator());
       expect(";");
@@ -207,11 +196,11 @@ class StParser {
     }
     expect(";");
     const Function* type = found(structs_, one.type);
+    if (type != nullptr && numbers.empty()) return;  // extern
     if (type != nullptr) return settings(*type, one.name, numbers);
     one.initial = listed(numbers, [](const std::string& each) { return each; });
     const auto& first = function_.variables;
-    const bool is_local = !function_.name.empty() && (first.empty() || first[0].type != state_);
-    Function* state = is_local ? nullptr : found(structs_, state_);
+    Function* state = first.empty() || first[0].type == state_ ? found(structs_, state_) : nullptr;
     (state == nullptr ? function_ : *state).variables.push_back(one);
   }
 
@@ -232,24 +221,23 @@ class StParser {
     to_.functions_.push_back({to_.name_ + "_set_first", "", to_.settings("first")});
   }
 
-  void function(const std::string& comment) {
-    expect("(");
+  void function(const Variable& head, const std::string& comment) {
+    function_.name = of_this(head.name);
+    function_.type = head.type;
     for (; to_.error.empty() && !take(")"); ++function_.parameters) {
       Variable one = declarator();
       // Another struct that is read is given by its value.
-      const bool whole = one.is_constant && one.type != state_;
-      const bool by_reference = !one.sizes.empty() || (one.part == "VAR_IN_OUT" && !whole);
-      one.part = by_reference ? "VAR_IN_OUT" : "VAR_INPUT";
+      const bool is_whole = one.part == "VAR" || (one.is_constant && one.type != state_);
+      one.part = is_whole && one.sizes.empty() ? "VAR_INPUT" : "VAR_IN_OUT";
       function_.variables.push_back(one);
       (void)take(",");
     }
     if (take(";")) return;
-    expect("{");
     lines_.clear();
     temporaries_ = 0;
     if (function_.name == of_this("is_finite")) {
       // By its value: the largest LREAL is no number to each compiler.
-      line(function_.name + " := (ABS(x) * 0.5 < ABS(x)) OR (x = 0.0);");
+      lines_ = {"  " + function_.name + " := (ABS(x) * 0.5 < ABS(x)) OR (x = 0.0);"};
       skip_behind("}");
     } else {
       block();
@@ -266,7 +254,6 @@ class StParser {
     }
     for (const std::string& each : lines_) text += each + "\n";
     function_.text = text + "END_FUNCTION\n\n";
-    if (to_.has(function_.name)) fail("a second one");
     to_.functions_.push_back(function_);
   }
 
@@ -280,24 +267,17 @@ class StParser {
 
   void line(const std::string& text) { lines_.push_back(indent_ + text); }
 
-  /// `{ .. }`, of which the first is taken already.
-  void block() {
-    const auto comment = [this] {  // behind the last line
-      const std::string& behind = tokens_[at_ - 1].behind;
-      if (!behind.empty() && !lines_.empty()) lines_.back() += " " + behind;
-    };
-    comment();
-    while (to_.error.empty() && !take("}")) {
-      if (!tokens_[at_].before.empty()) line(tokens_[at_].before);
-      statement();
-      comment();
-    }
-  }
-  /// @param last a statement behind the others
-  void body(const std::string& last = "") {
+  /// `{ .. }` @param last a statement behind the others
+  void block(const std::string& last = "") {
     expect("{");
     indent_ += "  ";
-    block();
+    while (to_.error.empty()) {
+      const std::string& behind = tokens_[at_ - 1].behind;  // the last line
+      if (!behind.empty() && !lines_.empty()) lines_.back() += " " + behind;
+      if (take("}")) break;
+      if (!tokens_[at_].before.empty()) line(tokens_[at_].before);
+      statement();
+    }
     if (!last.empty()) line(last);
     indent_.resize(indent_.size() - 2);
   }
@@ -310,14 +290,7 @@ class StParser {
       if (peek() != ";") assign({function_.name, function_.type}, expression());
       line("RETURN;");
     } else {
-      if (take("(")) skip_behind(")");  // void
-      if (take("memset")) {             // of the state: as the variables of a function begin
-        add_local({"nothing", state_});
-        line("o := nothing;");
-        return skip_behind(";");
-      }
-      (void)take("*");
-      const Value left = postfix();
+      const Value left = unary();
       if (take("=")) {
         assign(left, expression());
       } else {
@@ -346,9 +319,13 @@ class StParser {
     line(name + " := " + value.text + ";");
   }
 
+  /// Of a type, a table, a function or a local variable.
   void declaration() {
-    const bool is_table = take("static");
+    const std::string comment = tokens_[at_].before;
+    if (take("typedef")) return structure();
+    const bool is_table = take("static") || take("extern") || function_.name.empty();
     const Variable one = declarator();
+    if (take("(")) return function(one, comment);
     if (one.part != "VAR") fail("a pointer " + one.name);
     if (is_table) return table(one);
     add_local(one);
@@ -368,13 +345,12 @@ class StParser {
     expect("(");
     line(begin + (begin == "IF " ? expression().text : alone()) + " THEN");
     expect(")");
-    body();
+    block();
     if (take("else")) {
       if (take("if")) return condition("ELSIF ");
       line("ELSE");
-      const std::size_t empty = lines_.size();
-      body();
-      if (lines_.size() == empty) lines_.pop_back();
+      block();
+      if (lines_.back() == indent_ + "ELSE") lines_.pop_back();
     }
     line("END_IF;");
   }
@@ -393,7 +369,7 @@ class StParser {
       step = i + " := " + i + " " + step[0] + " 1;";
     }
     expect(")");
-    body(step);
+    block(step);
     line("END_WHILE;");
   }
 
@@ -431,7 +407,8 @@ class StParser {
                                 "UDINT_TO_DWORD(" + argument(right) + "))"
                           : left.operand() + word + right.operand();
       left.lazy = left.lazy || right.lazy || (sign == "-" && of == "UDINT");
-      left = {left.text, word.find_first_of("=<>") < word.size() ? "BOOL" : of, left.lazy, of_bits};
+      left = {left.text, word.find_first_of("=<>") < word.size() ? "BOOL" : of, left.lazy,
+              !of_bits};
     }
     return left;
   }
@@ -442,16 +419,16 @@ class StParser {
       (void)next();
       Value of = unary();
       if ((of.type == "BOOL") != negates || of.type == "UDINT") fail("a sign of '" + of.text + "'");
-      return {(negates ? "NOT " : "-") + of.operand(), of.type, of.lazy, false, of.by_reference};
+      return {(negates ? "NOT " : "-") + of.operand(), of.type, of.lazy, true, of.by_reference};
     }
-    if (take("&") || take("*")) return postfix();
     if (peek() == "(" && !type(peek(1)).empty() && peek(2) == ")") {
-      const std::string to = type(peek(1));
+      const std::string word = peek(1), to = type(word);
       at_ += 3;
       const Value of = unary();
-      if (of.type == to) return of;
+      if (of.type == to || word == "void") return of;
       return {of.type + "_TO_" + to + "(" + argument(of) + ")", to, of.lazy};
     }
+    (void)(take("&") || take("*"));
     return postfix();
   }
 
@@ -479,9 +456,8 @@ class StParser {
     const std::string word = next();
     if (word == "(") {
       Value inner = expression();
-      expect(")");
-      inner.brackets = inner.brackets || !inner.is_one;
-      return inner;
+      inner.brackets = inner.brackets || inner.has_sign;
+      return expect(")"), inner;
     }
     if (word == "true" || word == "false") return {word == "true" ? "TRUE" : "FALSE", "BOOL"};
     if (is_digit(word[0])) {
@@ -489,14 +465,18 @@ class StParser {
       if (word.back() == 'f') return {StTranslator::number(word), "REAL"};
       return scaled(std::strtod(word.c_str(), nullptr));
     }
-    if (take("(")) return call(word);
+    if (take("(") && word == "memset") {  // of the state: as the variables of a function begin
+      add_local({"nothing", state_});
+      line("o := nothing;");
+      return skip_behind(")"), Value{};
+    }
+    if (tokens_[at_ - 1].text == "(") return call(word);
     if (word == set_) return {set_, to_.name_ + "_settings"};
     if (const Variable* one = found(function_.variables, word)) return {name_of(word), one->type};
     const Function* state = found(structs_, state_);
     const Variable* one = state == nullptr ? nullptr : found(state->variables, word);
     if (one != nullptr && !one->initial.empty()) return {"o." + name_of(word), one->type};
-    fail("'" + word + "' is not known");
-    return {};
+    return fail("'" + word + "' is not known"), Value{};
   }
 
   /// In the brackets of another call. A call with VAR_IN_OUT stands before it: not each compiler
@@ -537,9 +517,10 @@ class StParser {
       value.by_reference = value.by_reference || by_reference;
       (void)take(",");
     }
-    if (own == nullptr) return {filled(of_c->second, {{"$x", value.text}}), real_, value.lazy};
-    if (i != function.parameters || tokens_[at_ - 1].text != ")") fail("a call of " + word);
-    value.text = name + "(" + value.text + ")";
+    if (tokens_[at_ - 1].text != ")" || (own != nullptr && i != function.parameters)) {
+      fail("a call of " + word);
+    }
+    value.text = filled(own != nullptr ? name + "($x)" : of_c->second, {{"$x", value.text}});
     return value;
   }
 
@@ -567,14 +548,11 @@ class StParser {
   }
   /// An LREAL beyond what a REAL holds, which not each compiler takes: times a power of 2^126.
   static Value scaled(double value) {
-    const bool up = (std::abs)(value) > 1;
     std::string by;
-    for (; (std::abs)(value) > 1e37 || (value != 0 && (std::abs)(value) < 1e-37);
-         value *= up ? 0x1p-126 : 0x1p126) {
-      by += up ? " * 8.507059173023462E+37" : " * 1.1754943508222875E-38";
-    }
+    for (; value > 1e37; value *= 0x1p-126) by += " * 8.507059173023462E+37";
+    for (; value > 0 && value < 1e-37; value *= 0x1p126) by += " * 1.1754943508222875E-38";
     const std::string text = StTranslator::number(ListWriter(c_language, false).number(value)) + by;
-    return {text, "LREAL", false, true, false, !by.empty()};
+    return {text, "LREAL", false, false, false, !by.empty()};
   }
 
   StTranslator& to_;
@@ -590,7 +568,7 @@ class StParser {
   // Of the function at hand.
   Function function_{};
   std::vector<std::string> lines_{};
-  std::string indent_ = "  ";
+  std::string indent_{};
   int temporaries_ = 0;
 };
 
