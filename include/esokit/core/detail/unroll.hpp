@@ -14,7 +14,8 @@
 
 /// @def ESOKIT_INLINE
 /// Forces inlining. Used for all parts of a step: otherwise GCC at -O2 leaves
-/// some of them as calls, and the state goes through memory between them.
+/// some of them as calls, and the state goes through memory between them. Not without optimisation:
+/// there every copy stays whole, and a run of a simulation takes up to 480 kB.
 
 /// @def ESOKIT_INLINE_LAMBDA
 /// The same for a lambda, written after its parameters.
@@ -23,7 +24,7 @@
 /// Keeps code that runs rarely out of line, so that it costs the normal step
 /// nothing.
 
-#if defined(__GNUC__)
+#if defined(__GNUC__) && defined(__OPTIMIZE__)
 #define ESOKIT_INLINE [[gnu::__always_inline__]] inline
 #define ESOKIT_INLINE_LAMBDA __attribute__((__always_inline__))
 #define ESOKIT_COLD [[gnu::__noinline__, gnu::__cold__]]
