@@ -60,12 +60,14 @@ requires(detail::can_rest<Controller>()) struct RestingConfig {
 /// y has left the band, from an estimate that knows it. A lost sample changes nothing; after
 /// `missing.most` u goes to `missing.input` as ever.
 ///
-/// Choose `error` above noise, one and a half counts of an encoder or more, and not below the
-/// largest error of the hunting: where it sticks outside of the band it hunts on. That is about
-/// (stiction - Coulomb friction) / (omega_o omega_c), both in the unit of y''. `time` is about
-/// 5 / omega_c, so that what is held is what the load needs. In the band the error is not
-/// controlled: without friction the axis drifts to its edge, is answered there, and overshoots it
-/// by as much again.
+/// Choose `error` above noise, one and a half counts of an encoder or more, and above the largest
+/// error of the hunting: where it sticks outside of the band it hunts on. Half a count and
+///
+///     1.5 (stiction - Coulomb friction) / (omega_o omega_c)
+///
+/// are enough, friction in the unit of y''. `time` is about 5 / omega_c, so that what is held is
+/// what the load needs. In the band the error is not controlled: without friction the axis drifts
+/// to its edge, is answered there, and overshoots it by as much again.
 ///
 /// Around MappedInput give a dead zone a softness of a fourth of its width: of a u that jumps from
 /// one side of it to the other, either would be held (examples/actuator).
