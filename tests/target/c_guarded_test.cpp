@@ -56,6 +56,30 @@ TEST(CGuarded, OfSeveralMeasuredDisturbances) {
                                                                            "gcc -std=c99", 2);
 }
 
+/// The self-test pins, holds, releases, and changes trust and b0.
+TEST(CGuarded, IsTested) {
+  if (!there("gcc") || !there("gcov")) GTEST_SKIP() << "no gcov";
+  using C = Adrc<Guarded<LinearEso<2, float>>, ErrorBased>;
+  auto settings = config<C>(8);
+  settings.observer.release_samples = 3;
+  settings.start_hold = {};
+  const CCode code = to_c(C::make(settings).value(), {.name = "loop"}).value();
+  reaches(code);
+  notices(code,
+          {{"(where > LOOP_PIN_EITHER)", "(where > 99u)"},
+           {"(where == LOOP_PIN_EITHER)", "(where == 99u)"},
+           {"o->release_left = RELEASE", "o->release_left = 0u"},
+           {"(trust < 0.0f) ? 0.0f", "(trust < 0.0f) ? 0.25f"},
+           {"(moved > 0.0f) ? o->weight_up", "(moved < 0.0f) ? o->weight_up"},
+           {"(sum > 0.0f) ? most : -most", "(sum > 0.0f) ? most : most"},
+           {"o->unsettled = 1u", "o->unsettled = 0u"},
+           {"o->held = 0u;\n  set_weights(o)", "o->held = 0u"},
+           {"(ratio > 0.0f)", "(ratio > -9.0f)"}},
+          0.0F);
+  reaches(to_c(Guarded<LinearEso<2, float>>::make(settings.observer).value(), {.name = "loop"})
+              .value());
+}
+
 /// Pin, hold, release and a changing b0, which every comparison of a Guarded has, with a bound in
 /// the unit of u and a time after a pin.
 TEST(CGuarded, OfPinHoldAndGain) {

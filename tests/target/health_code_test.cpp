@@ -166,6 +166,25 @@ std::array<int, 9> watches(double plant_gain, double bad, std::uint64_t seed, do
   return named;
 }
 
+/// The self-test has each fault, and what takes it back.
+TEST(HealthCode, IsTested) {
+  if (!there("gcc") || !there("gcov")) GTEST_SKIP() << "no gcov";
+  using C = Adrc<LinearEso<1, float>>;
+  const CCode code =
+      to_c(monitor<C>(1e-3F), C::make(config<C>(-8)).value(), {.name = "loop"}).value();
+  reaches(code);
+  notices(code,
+          {{"LOOP_SENSOR_STILL;", "LOOP_NONE;"},
+           {"LOOP_SATURATED;", "LOOP_NONE;"},
+           {"o->reversed = true", "o->reversed = false"},
+           {"o->reversed = false", "o->reversed = true"},
+           {"THRICE_NOISE)) {", "THRICE_NOISE) && !told) {"},
+           {"SIGN_OF_GAIN * limit", "limit"},
+           {"o->steady = o->steady + STEP", "o->steady = STEP"},
+           {"o->is_free = o->is_free && sample->runs", "o->is_free = o->is_free || sample->runs"}},
+          0.0F);
+}
+
 TEST(HealthCode, EqualsTheMonitor) {
   if (!there("gcc")) GTEST_SKIP() << "no gcc";
   using C = Adrc<LinearEso<2, double>>;

@@ -5,6 +5,7 @@
 
 #include <cctype>
 #include <cstdint>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <esokit/adapter/guarded.hpp>
@@ -282,6 +283,56 @@ class Library {
   static inline int count = 0;
   void* handle_ = nullptr;
 };
+
+/// What gcov says of loop.c in per cent: lines, and branches that were taken. @param given to the
+/// self-test @param least_lines, least_branches what it has to reach
+inline void reaches(const CCode& code, const std::string& given = "0.0f", double least_lines = 95,
+                    double least_branches = 85) {
+  const Folder folder;
+  folder.write("loop.h", code.header);
+  folder.write("loop.c", code.source);
+  folder.write("main.c",
+               "#include \"loop.h\"\nint main(void) { return loop_self_test(" + given + "); }\n");
+  ASSERT_TRUE(runs("cd " + folder.file("") +
+                   " && gcc -std=c99 -O0 --coverage -DLOOP_SELF_TEST main.c loop.c -o all -lm && "
+                   "./all && gcov -b all-loop.gcda >found.txt 2>&1"));
+  std::ifstream text(folder.file("found.txt"));
+  double lines = 0;
+  double branches = 0;
+  bool is_it = false;
+  for (std::string line; std::getline(text, line);) {
+    if (line.rfind("File ", 0) == 0) is_it = line == "File 'loop.c'";
+    if (!is_it) continue;
+    std::sscanf(line.c_str(), "Lines executed:%lf", &lines);
+    std::sscanf(line.c_str(), "Taken at least once:%lf", &branches);
+  }
+  EXPECT_GE(lines, least_lines);
+  EXPECT_GE(branches, least_branches);
+}
+
+struct Change {
+  const char *from, *to;
+};
+
+/// That the self-test passes, and no longer after any of the changes. @param given to it
+template <class... Given>
+void notices(const CCode& code, const std::vector<Change>& changes, Given... given) {
+  std::vector<Change> all{{"", ""}};
+  all.insert(all.end(), changes.begin(), changes.end());
+  for (const auto& [from, to] : all) {
+    SCOPED_TRACE(from);
+    CCode changed = code;
+    const std::size_t at = changed.source.find(from);
+    ASSERT_NE(at, std::string::npos);
+    changed.source.replace(at, std::string(from).size(), to);
+    const Folder folder;
+    const Library library(folder, changed, "", "gcc -std=c99 -Wno-error");
+    int (*self_test)(Given...) = nullptr;
+    library.find(self_test, "loop_self_test");
+    ASSERT_NE(self_test, nullptr);
+    EXPECT_EQ(self_test(given...) == 0, from[0] == '\0');
+  }
+}
 
 /// The compiled C of a controller or an observer.
 template <class V>

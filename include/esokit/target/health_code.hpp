@@ -7,6 +7,7 @@
 #include <esokit/core/expected.hpp>
 #include <esokit/observer/concepts.hpp>
 #include <esokit/target/c_code.hpp>
+#include <esokit/target/detail/health_test.hpp>
 #include <esokit/target/detail/list_writer.hpp>
 #include <esokit/target/detail/recorded_design.hpp>
 #include <esokit/target/detail/runtime_text.hpp>
@@ -79,6 +80,17 @@ requires std::same_as<S, typename Controller::scalar_type> Expected<CCode, Error
              {"ONE_SIDE", 0.8}}) {
       text.constant(name, in_double.number(x));
     }
+    const int late = static_cast<int>(static_cast<S>(Size * settings.divider) / settings.step);
+    const auto rows = detail::watched_self_test<S>(
+        monitor, controller, settings.range, settings.middle, settings.step, S(1) / settings.weight,
+        settings.divider, late, options.self_test_samples);
+    text.constant("LATE", std::to_string(late) + "u");
+    text.constant("ROWS", std::to_string(rows.size()));
+    text.counts({{"COLUMNS", rows.front().size()}, {"FOUND", rows.front().size() - 12}});
+    text.lines("DESIGN_VECTORS", text.writer().rows(rows));
+    text.replace("DESIGN_COLUMNS",
+                 "of u: mean, move; disturbance, u beyond, u beyond by way, slope, innovation, "
+                 "status, missed, stops, half, times; then what is found");
     text.count("SIZE", Size);
     text.count("DIVIDER", static_cast<std::size_t>(settings.divider));
     text.replace("DESIGN_MEMORY",

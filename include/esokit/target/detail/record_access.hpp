@@ -636,7 +636,9 @@ struct RecordAccess {
       std::vector<std::pair<const char*, S>> constants;
       S weight;
       int divider;
-    } all{{}, m.weight_, m.divider_};
+      S range, middle;  ///< of u
+      S step;           ///< omega_o T D
+    } all{{}, m.weight_, m.divider_, m.range_, m.middle(c.limiter()), m.step_};
     const S b = c.observer().input_gain();
     const S range = absolute(b) * m.range_;
     const S noise = m.health_.innovation_of_noise;
@@ -649,7 +651,8 @@ struct RecordAccess {
                      {"LARGEST", S(1000) * range},
                      {"POLE", m.pole_},
                      {"SLOW", m.slow_},
-                     {"MIDDLE", b * m.middle(c.limiter())},
+                     {"MIDDLE", b * all.middle},
+                     {"FIRST_HELD", c.limiter().last()},
                      {"END_OF_RANGE", static_cast<S>(0.9) * range},
                      {"LEAST_AGAINST", m.larger(static_cast<S>(0.02) * range, S(3) * m.least_)},
                      {"RANGE", range},

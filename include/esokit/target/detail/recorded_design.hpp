@@ -14,6 +14,8 @@
 #include <esokit/target/detail/writable.hpp>
 #include <esokit/target/detail/written_names.hpp>
 #include <esokit/target/recorder.hpp>
+#include <limits>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -399,6 +401,47 @@ bool give_measured(Object& object, V w) {
   return count > 0;
 }
 
+/// Calls of what is beside the samples. @param object with its observer @param fresh as at first
+/// @param has_settings in a struct @return the status as the C has it, or none if the call is none
+/// of it
+template <class Object, class Guard, class V>
+std::optional<unsigned> called_beside(Object& object, Guard& guard, const Object& fresh,
+                                      TestCall call, V y, V u, bool has_settings) {
+  const auto of = [](auto good) { return good ? 0U : 1U; };
+  if constexpr (requires { guard.set_pin(Pin::free); }) {
+    if (call == TestCall::trusts) return static_cast<unsigned>(guard.set_trust(y));
+    if (call == TestCall::pins && !(y <= V(3))) {
+      return static_cast<unsigned>(StepStatus::input_rejected);
+    }
+    if (call == TestCall::pins) {
+      guard.set_pin(static_cast<Pin>(static_cast<int>(y)));
+      return 0U;
+    }
+    if constexpr (requires { object.set_input_gain(y); }) {
+      if (call == TestCall::gains) return of(static_cast<bool>(object.set_input_gain(y)));
+    }
+  }
+  if constexpr (requires { object.adopt(fresh); }) {
+    if (call == TestCall::adopts) return of(!(y > V(0)) && object.adopt(fresh));
+  }
+  if (call != TestCall::keeps) return {};
+  if (!(y >= V(1)) || !is_finite(y) || !is_finite(u)) return 1U;
+  if constexpr (requires { object.adopt(fresh); }) {
+    if (has_settings) (void)object.adopt(fresh);
+  }
+  const V none = (std::numeric_limits<V>::max)() * V(4);
+  for (int left = static_cast<int>(y); left > 0; --left) {
+    if constexpr (requires { object.track(none, none, u); }) {
+      (void)object.track(none, V(0), u);
+    } else if constexpr (requires { object.track(none, u); }) {
+      (void)object.track(none, u);
+    } else if constexpr (requires { object.predict(u); }) {
+      (void)object.predict(u);
+    }
+  }
+  return 0U;
+}
+
 /// r, or with its motion.
 template <int inputs, class Beside>
 auto reference(const Beside& beside) {
@@ -409,10 +452,23 @@ auto reference(const Beside& beside) {
   }
 }
 
+/// What a guard holds. @return u
+template <class C, class V>
+V held(C& controller, V y, V u) {
+  if constexpr (requires { controller.hold(y, V(0), u); }) {
+    return controller.hold(y, V(0), u);
+  } else if constexpr (requires { controller.hold(y, u); }) {
+    return controller.hold(y, u);
+  } else {
+    return u;
+  }
+}
+
 /// The self-test of a controller in one phase.
 template <int inputs, class C>
 void take_samples(RecordedDesign& design, C played) {
   using V = typename C::scalar_type;
+  const C fresh = played;
   const double law =
       design.law_gains.empty() ? 0 : std::abs(design.law_gains[0] / design.input_gain);
   take_self_test<V, inputs>(
@@ -426,6 +482,14 @@ void take_samples(RecordedDesign& design, C played) {
         const auto estimated = [&](auto status) {
           return with_mode(estimate_of(played.observer(), row), status);
         };
+        if (const auto status = called_beside(played, played.observer(), fresh, call, y, beside(0),
+                                              design.options.settings_in_struct)) {
+          return estimated(*status);
+        }
+        if (call == TestCall::holds) {
+          const V u = held(played, y, beside(0));
+          return with_mode(u, played.status());
+        }
         if (call == TestCall::starts) return estimated(played.start(y, beside(0)));
         if (call == TestCall::reports) return estimated(played.applied(beside(0)));
         if (call == TestCall::measures && give_measured<Of>(played, y)) return estimated(0U);
@@ -610,7 +674,17 @@ Expected<RecordedDesign, Error<typename Observer::scalar_type>> recorded_design(
       maker.design, 0,
       [&](TestCall call, V y, const auto& u, int row) {
         StepStatus status{};
-        if (call == TestCall::misses) {
+        if (const auto beside = called_beside(played, played, observer, call, y, u(0),
+                                              maker.design.options.settings_in_struct)) {
+          status = static_cast<StepStatus>(*beside);
+        } else if (call == TestCall::holds) {
+          if constexpr (requires { played.release(); }) {
+            status = played.update(y, played.hold(u(0)));
+            played.release();
+          }
+        } else if (call == TestCall::rests) {
+          for (int left = static_cast<int>(y); left > 0; --left) status = played.update(u(0), u(0));
+        } else if (call == TestCall::misses) {
           for (int left = static_cast<int>(y); left > 0; --left) status = played.predict(u(0));
         } else if (call == TestCall::starts || call == TestCall::resets) {
           status = played.reset(y);

@@ -26,13 +26,19 @@ enum class TestCall : unsigned {
   splits,    ///< the two phases, with a report between them
   loses,     ///< the same without a measurement
   measures,  ///< a disturbance w
-  rests      ///< y times a sample with y at r
+  rests,     ///< y times a sample with y at r
+  trusts,    ///< a guard, by y
+  pins,      ///< it, at limit number y
+  holds,     ///< under u
+  gains,     ///< with b0 = y
+  adopts,    ///< the settings it has, or foreign ones if y is 1
+  keeps      ///< y samples after a save under u: it is loaded. 0: it is foreign
 };
 
 inline constexpr unsigned bad_y = 16;       ///< y is infinite
 inline constexpr unsigned bad_beside = 32;  ///< what stands beside it is
 
-inline constexpr int most_calls = 80;  ///< samples with one; after them there are plain updates
+inline constexpr int most_calls = 80;  ///< samples with those of all designs
 
 inline constexpr unsigned of_row = 64;  ///< times the number of the estimate that is compared
 
@@ -56,12 +62,17 @@ inline constexpr unsigned of_mode = 512;  ///< times the mode, in the status tha
 
 /// What the calls of a self-test depend on.
 struct TestNumbers {
-  unsigned longest;  ///< gap that has a gain, samples
-  unsigned rest;     ///< samples until it rests; 0: never
-  unsigned limit;    ///< of missing measurements, samples
-  double largest;    ///< number
-  double huge;       ///< u, which a start still takes
-  double step;       ///< of r
+  unsigned longest;   ///< gap that has a gain, samples
+  unsigned rest;      ///< samples until it rests; 0: never
+  unsigned limit;     ///< of missing measurements, samples
+  double largest;     ///< number
+  double huge;        ///< u, which a start still takes
+  double step;        ///< of r
+  double gain;        ///< b0
+  double period;      ///< of an angle, or 0
+  unsigned release;   ///< measurements after a pin, samples
+  unsigned settling;  ///< and after a hold
+  unsigned delay;     ///< of u, samples
 };
 
 /// The calls that are no plain update: gaps that are bridged, that restart and that end in safe
@@ -119,6 +130,161 @@ inline PlannedCall planned(int sample, const TestNumbers& of) {
   return is_update ? PlannedCall{sample, TestCall::update} : *found;
 }
 
+/// Trust, pins, holds and a changing b0, each on both sides, and what is beyond its limits.
+inline std::vector<PlannedCall> calls_of_guard(const TestNumbers& of, bool changes_gain) {
+  const auto rest = [&](unsigned samples) {
+    return PlannedCall{0, TestCall::rests, 0, static_cast<double>((std::min)(samples + 1, 1000U))};
+  };
+  const PlannedCall update{0, TestCall::update};
+  const PlannedCall hold{.sample = 0, .call = TestCall::holds, .beside = of.step};
+  const auto pin = [](double where) { return PlannedCall{0, TestCall::pins, 0, where}; };
+  const auto trust = [](double phi) { return PlannedCall{0, TestCall::trusts, 0, phi}; };
+  const auto far = [](double y) { return PlannedCall{0, TestCall::update, 0, y}; };
+  std::vector<PlannedCall> all{
+      {.sample = 0, .call = TestCall::starts, .beside = 0},
+      // The bound, and u at both limits.
+      far(1e6),
+      far(-1e6),
+      {.sample = 0, .call = TestCall::starts, .beside = 0},
+      {0, TestCall::trusts, bad_y, 4},
+      trust(-1),
+      update,
+      trust(0.5),
+      update,
+      trust(2),
+      pin(1),
+      update,
+      pin(2),
+      update,
+      pin(4),
+      pin(3),
+      update,
+      pin(0),
+      update,
+      pin(0),
+      rest(of.release),
+      {.sample = 0, .call = TestCall::reports, .beside = of.step},
+      update,
+      pin(3),
+      update,
+      {.sample = 0, .call = TestCall::reports, .beside = -of.step},
+      update,
+      pin(3),
+      pin(0),
+      rest(of.release),
+      hold,
+      update,
+      // The settling begins anew where it is disturbed.
+      trust(0.5),
+      update,
+      trust(1),
+      rest(of.settling),
+      update,
+      {0, TestCall::holds, bad_y, 4},
+      {0, TestCall::holds, bad_y, 4},
+      update,
+      // u may be at its limit: the disturbance says what was kept.
+      {.sample = 0, .call = TestCall::reports, .beside = 0},
+      {.sample = 0, .call = TestCall::holds, .bad = bad_beside, .beside = 4},
+      update,
+      {0, TestCall::misses, 0, static_cast<double>((std::min)(of.longest + 1, 1000U))},
+      hold,
+      update};
+  if (changes_gain) {
+    for (const double b : {1.25 * of.gain, -of.gain, 0.0, 0.8 * of.gain, of.gain}) {
+      all.insert(all.end(), {PlannedCall{0, TestCall::gains, 0, b}, update});
+    }
+    all.push_back({0, TestCall::gains, bad_y, 4});
+  }
+  return all;
+}
+
+/// A state that is taken up again, and what is refused.
+inline std::vector<PlannedCall> calls_of_kept(const TestNumbers& of) {
+  const PlannedCall update{0, TestCall::update};
+  return {{.sample = 0, .call = TestCall::starts, .beside = 0},
+          update,
+          {0, TestCall::keeps, 0, 1, of.step},
+          update,
+          update,
+          {0, TestCall::keeps, 0, static_cast<double>((std::min)(of.longest + 1, 1000U)), of.step},
+          update,
+          update,
+          {0, TestCall::keeps, 0, 0, of.step},
+          {0, TestCall::keeps, bad_y, 4, of.step},
+          {0, TestCall::keeps, bad_beside, 1, 4},
+          update};
+}
+
+/// Angles that move steadily, that jump, and that are missing now and then.
+inline std::vector<PlannedCall> calls_of_angle(const TestNumbers& of) {
+  const auto at = [&](double turns) {
+    return PlannedCall{.sample = 0, .call = TestCall::update, .y = turns * of.period, .beside = 0};
+  };
+  const PlannedCall missed{.sample = 0, .call = TestCall::misses, .y = 1, .beside = 0};
+  const PlannedCall at_rest{0, TestCall::rests, 0, 50, 0};
+  std::vector<PlannedCall> all{{0, TestCall::starts, 0, 0, 0}, at_rest};
+  // Faster than a gate lets in, across the end of a turn; then a jump, and back.
+  for (int k = 1; k <= 12; ++k) all.push_back(at(0.03 * k * k / 12.0 + 0.06 * k));
+  for (const double turns : {0.1, 0.55, 0.1, 0.55, 0.1, 0.1, 0.1}) all.push_back(at(turns));
+  all.insert(all.end(), {missed, missed, at(0.1), at(0.12)});
+  for (int k = 0; k < 9; ++k) all.insert(all.end(), {missed, at(0.14 + 0.02 * k)});
+  all.insert(all.end(), {at(0.3), {0, TestCall::misses, 0, of.longest + 1.0, 0}, at(0.2), at(0.2)});
+  return all;
+}
+
+/// A state near the end of the numbers, where a start does not lead, or u acts late.
+inline std::vector<PlannedCall> calls_from_afar(const TestNumbers& of) {
+  const auto misses = [](double samples) {
+    return PlannedCall{0, TestCall::misses, 0, (std::min)(samples, 1000.0), 0};
+  };
+  const PlannedCall lost{0, TestCall::update, bad_y, 4, 0};
+  const PlannedCall update{0, TestCall::update};
+  std::vector<PlannedCall> all;
+  for (const double u : {of.largest, -of.largest}) {
+    all.insert(all.end(), {misses(of.longest + 1.0),
+                           {0, TestCall::update, 0, -of.largest, 0},
+                           {.sample = 0, .call = TestCall::reports, .beside = u},
+                           misses(of.delay + 1.0),
+                           update});
+  }
+  for (const double u : {of.huge, 2 * of.huge}) {
+    all.insert(all.end(), {{0, TestCall::starts, 0, of.largest, -of.huge},
+                           {.sample = 0, .call = TestCall::reports, .beside = u},
+                           misses(of.delay + 1.0),
+                           lost,
+                           update});
+  }
+  all.push_back({.sample = 0, .call = TestCall::reports, .bad = bad_beside, .beside = 4});
+  all.insert(all.end(), {{.sample = 0, .call = TestCall::starts, .beside = 0}, update});
+  return all;
+}
+
+/// What a design has beside the calls of all.
+inline std::vector<PlannedCall> further_calls(const RecordedDesign& design, const TestNumbers& of) {
+  std::vector<PlannedCall> all;
+  const auto add = [&](const std::vector<PlannedCall>& more) {
+    all.insert(all.end(), more.begin(), more.end());
+  };
+  if (design.guard.on) add(calls_of_guard(of, !design.softens));
+  if (design.wrap.period > 0) add(calls_of_angle(of));
+  if (design.is_controller && (design.error_based || !design.line.empty())) {
+    add(calls_from_afar(of));
+  }
+  if (design.options.settings_in_struct) {
+    add({{.sample = 0, .call = TestCall::adopts, .y = 0},
+         {0, TestCall::update},
+         {0, TestCall::misses, 0, of.longest - 1.0},
+         {0, TestCall::update},
+         {.sample = 0, .call = TestCall::adopts, .y = 0},
+         {0, TestCall::update},
+         {.sample = 0, .call = TestCall::adopts, .y = 1},
+         {0, TestCall::update}});
+  }
+  if (design.options.saves_state && !design.softens) add(calls_of_kept(of));
+  return all;
+}
+
 /// The plant of the design, exact for a u that is held: y^(n) = b0 u.
 class TestPlant {
  public:
@@ -169,15 +335,26 @@ void take_self_test(RecordedDesign& design, double law, Calls&& calls, Output&& 
       .limit = design.loop.missing_limit,
       .largest = most,
       .huge = 0.25 * most / (std::max)(1.0, std::abs(design.input_gain)),
-      .step = size};
+      .step = size,
+      .gain = design.error_based ? -design.input_gain : design.input_gain,
+      .period = design.wrap.period,
+      .release = design.guard.release_samples,
+      .settling = design.guard.settling_samples,
+      .delay = static_cast<unsigned>(design.line.size())};
+  const bool has_all = design.options.self_test_samples >= most_calls;
+  const auto further = has_all ? further_calls(design, numbers) : std::vector<PlannedCall>{};
+  const int calls_end = most_calls + static_cast<int>(further.size());
+  const int samples = design.options.self_test_samples + static_cast<int>(further.size());
   // The text has no infinite numbers.
   const auto number = [most](double x) { return static_cast<V>(std::clamp(x, -most, most)); };
   TestPlant plant(design.order, design.input_gain, design.sample_time);
-  for (int k = 0; k < design.options.self_test_samples; ++k) {
-    PlannedCall plan = planned(k, numbers);
+  for (int k = 0; k < samples; ++k) {
+    const bool beside_all = most_calls <= k && k < calls_end;
+    PlannedCall plan =
+        beside_all ? further[static_cast<std::size_t>(k - most_calls)] : planned(k, numbers);
     // Each estimate once, with a report.
     int row = (k - 4) / 2;
-    if (4 <= k && k % 2 == 0 && row < (std::min)(design.size, 8)) {
+    if (4 <= k && k < most_calls && k % 2 == 0 && row < (std::min)(design.size, 8)) {
       plan.call = TestCall::reports;
     } else {
       row = design.order;
@@ -199,7 +376,7 @@ void take_self_test(RecordedDesign& design, double law, Calls&& calls, Output&& 
     const TestResult<V> result = calls(plan.call, y, beside, row);
     sample.push_back(static_cast<double>(result.number));
     design.samples.push_back(std::move(sample));
-    if (k < most_calls) {
+    if (k < calls_end) {
       design.test_calls.push_back(
           {static_cast<unsigned>(plan.call) + plan.bad + of_row * static_cast<unsigned>(row),
            result.status});

@@ -323,6 +323,64 @@ unsigned esokit_diagnose(const esokit_state *o)
   }
   return fault;
 }
+
+#ifdef ESOKIT_SELF_TEST
+#define ROW_HALF 10u
+#define ROW_TIMES 11u
+#define ROW_FAULT 12u /* what is found begins here */
+
+static real way_of(uint32_t i, uint32_t half)
+{
+  return (((i / half) % 2u) == 0u) ? 1.0 : -1.0;
+}
+
+/* The sample of a row with this number. */
+static void sample_of(esokit_sample *sample, const real row[COLUMNS], uint32_t i)
+{
+  const uint32_t half = (uint32_t)row[ROW_HALF];
+  const real way = way_of(i, half);
+  sample->applied = row[0] + (row[1] * way);
+  sample->disturbance = row[2] * way_of((i + (2u * half)) - LATE, half);
+  sample->held = FIRST_HELD;
+  sample->asked = FIRST_HELD + (row[3] + (row[4] * way));
+  sample->estimate = row[5] * (real)i;
+  sample->measured = sample->estimate;
+  sample->innovation = row[6];
+  sample->status = (uint16_t)row[7];
+  sample->missed = (uint32_t)row[8];
+  sample->runs = !(row[9] > 0.0);
+}
+
+int esokit_self_test(real tolerance)
+{
+  static const real rows[ROWS][COLUMNS] = { /* DESIGN_COLUMNS */
+    DESIGN_VECTORS
+  };
+  esokit_state o;
+  int wrong = 0;
+  int at;
+  esokit_clear(&o);
+  for (at = 0; (at < ROWS) && (wrong == 0); ++at) {
+    esokit_sample sample;
+    const real *const row = rows[at];
+    const real *const found = &row[ROW_FAULT];
+    uint32_t i;
+    for (i = 0u; i < (uint32_t)row[ROW_TIMES]; ++i) {
+      sample_of(&sample, row, i);
+      esokit_look(&o, &sample);
+    }
+    const real numbers[FOUND] = {
+      (real)esokit_diagnose(&o), o.gain_ratio, o.sign_ratio, o.response, o.evidence, o.opposed,
+      o.steady, o.standing, o.saturated, o.side, o.underway, o.lost, o.innovation};
+    for (i = 0u; i < FOUND; ++i) {
+      if (!(fabs(numbers[i] - found[i]) <= tolerance)) {
+        wrong = at + 1;
+      }
+    }
+  }
+  return wrong;
+}
+#endif
 #ifdef __cplusplus
 ")esokit"
 #endif

@@ -84,6 +84,12 @@ void esokit_clear(esokit_state *o);
 void esokit_look(esokit_state *o, const esokit_sample *sample);
 unsigned esokit_diagnose(const esokit_state *o);
 
+#ifdef ESOKIT_SELF_TEST
+/* 0, or the number of the first row of samples after which the monitor of the design finds
+ * something else; each number within `tolerance`, 0 asks for equal ones. */
+int esokit_self_test(real tolerance);
+#endif
+
 #ifdef __cplusplus
 }
 #endif
