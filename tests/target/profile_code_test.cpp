@@ -218,6 +218,17 @@ TEST(ProfileCode, EqualsTheApproach) {
   equals_approach<2, 9, double>(14, -40.0, 0.3);
 }
 
+TEST(ProfileCode, AnApproachIsTested) {
+  if (!there("gcc") || !there("gcov")) GTEST_SKIP() << "no gcov";
+  const CCode code = to_c(approach<2, 1, float>(0.7, 0.1), {.name = "loop"}).value();
+  reaches(code);
+  notices(code,
+          {{"o->held = u;", "o->held = 0.0f;"},
+           {"inside = down;", "inside = change;"},
+           {"o->behind = 0.0f;", ""}},
+          0.0F);
+}
+
 /// A FollowProfile and its C, each call of which has to give the same.
 template <int Order, class S>
 class Followers {

@@ -101,6 +101,21 @@ TEST(TimeProportionedCode, ATestOfItselfHasNumbers) {
   EXPECT_EQ(self_test(0), 0);
 }
 
+TEST(TimeProportionedCode, IsTested) {
+  if (!there("gcc") || !there("gcov")) GTEST_SKIP() << "no gcov";
+  const auto made = TimeProportioned<float>::make(
+      {.off = 0, .on = 1, .window = 10, .least_on = 1, .least_off = 1, .sample_time = 0.1F});
+  const CCode code = to_c(made.value(), {.name = "loop"}).value();
+  reaches(code);
+  notices(code,
+          {{"samples = LONGEST;", "samples = WINDOW;"},
+           {"least = 1;", "least = SHORTEST;"},
+           {"inside = LOW;", "inside = HIGH;"},
+           {"samples = 0;\n    }", "samples = least;\n    }"},
+           {"o->carried = wanted - (float)o->on_samples", "o->carried = 0.0f"}},
+          0.0F);
+}
+
 TEST(TimeProportionedCode, CompilesWithOtherCompilers) {
   const CCode code =
       to_c(output<float>(100), {.name = "relay", .comment = "of the heater"}).value();

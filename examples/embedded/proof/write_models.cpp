@@ -2,9 +2,12 @@
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/control/predictive_adrc.hpp>
+#include <esokit/observer/adjustable_bandwidth_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>
+#include <esokit/observer/half_gain_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/model_eso.hpp>
+#include <esokit/observer/reduced_order_eso.hpp>
 
 #include "kinds.hpp"
 
@@ -16,6 +19,10 @@ constexpr ModelParts lag{.order = 2, .actuator = 1};
 
 void write_models_and_laws() {
   write_controller<Adrc<CascadeEso<2, 2, float>>>("cascade", "`CascadeEso<2, 2, float>`");
+  write_controller<Adrc<HalfGainEso<2, float>>>("half_gain", "`HalfGainEso<2, float>`");
+  write_controller<Adrc<ReducedOrderEso<2, float>>>("reduced", "`ReducedOrderEso<2, float>`");
+  write_controller<Adrc<AdjustableBandwidthEso<2, float>>>("adjustable",
+                                                           "`AdjustableBandwidthEso`");
   write_controller<Adrc<ModelEso<lag, float>>>("lag", "`ModelEso` with a lag of u");
   write_controller<DisturbanceCompensator<LinearEso<2, float>>>("compensator",
                                                                 "`DisturbanceCompensator`");

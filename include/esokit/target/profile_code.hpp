@@ -18,6 +18,7 @@
 #include <esokit/target/structured_text.hpp>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace esokit {
@@ -176,6 +177,35 @@ Expected<std::string, Error<S>> to_structured_text(const SmoothProfile<Order, S>
       detail::once_in_each(detail::RecordAccess::profile(profile).sample_time), add);
 }
 
+namespace detail {
+
+/// What the self-test of an ApproachProfile calls, as in runtime/approach.c.
+enum class ApproachCall : unsigned char {
+  updates,
+  updates_to_infinity,
+  starts,
+  starts_at_infinity,
+  starts_by_infinity,  ///< u is
+  starts_high,         ///< under the upper limit
+  starts_low
+};
+
+inline ApproachCall approach_call(int k) {
+  constexpr std::array<std::pair<int, ApproachCall>, 6> all{
+      {{39, ApproachCall::starts_low},  // before the target is on the other side
+       {79, ApproachCall::starts_high},
+       {56, ApproachCall::starts_at_infinity},
+       {58, ApproachCall::starts_by_infinity},
+       {60, ApproachCall::updates_to_infinity},
+       {64, ApproachCall::starts}}};
+  for (const auto& [at, call] : all) {
+    if (at == k) return call;
+  }
+  return ApproachCall::updates;
+}
+
+}  // namespace detail
+
 /// A profile towards any target as C99: `name_start` at rest at y under u, then `name_update` once
 /// a sample. `name_motion` gives (r, r') or (r, r', r''), and `name_feed` the u to add to that of
 /// the law. It equals the C++ bit for bit.
@@ -190,24 +220,38 @@ Expected<CCode, Error<S>> to_c(const ApproachProfile<Order, Capacity, S>& profil
     ApproachProfile<Order, Capacity, S> played = profile;
     (void)played.start(S(0), S(0));
     constexpr std::size_t count = static_cast<std::size_t>(Order) + 1;
-    std::vector<std::array<S, count + 2>> vectors;
+    constexpr S largest = (std::numeric_limits<S>::max)();
+    std::vector<std::array<S, count + 3>> vectors;
     for (int k = 0; k < options.self_test_samples; ++k) {
       const S way = detail::clipped(
           S(S((k / 40) % 2 == 0 ? 20 : -10) * config.sample_time * numbers.half_speed));
-      (void)played.update(way);
-      std::array<S, count + 2> sample{way, played.feed()};
-      for (int i = 0; i <= Order; ++i) sample[static_cast<std::size_t>(i + 2)] = played.motion()(i);
+      const auto call = detail::approach_call(k);
+      const S u = call == detail::ApproachCall::starts_high  ? detail::clipped(config.limits.upper)
+                  : call == detail::ApproachCall::starts_low ? detail::clipped(config.limits.lower)
+                                                             : S(0);
+      const S beyond = S(S(4) * largest);
+      if (call == detail::ApproachCall::updates) {
+        (void)played.update(way);
+      } else if (call == detail::ApproachCall::updates_to_infinity) {
+        (void)played.update(beyond);
+      } else {
+        (void)played.start(call == detail::ApproachCall::starts_at_infinity ? beyond : way,
+                           call == detail::ApproachCall::starts_by_infinity ? beyond : u);
+      }
+      std::array<S, count + 3> sample{way, static_cast<S>(static_cast<int>(call)), played.feed()};
+      for (int i = 0; i <= Order; ++i) sample[static_cast<std::size_t>(i + 3)] = played.motion()(i);
       vectors.push_back(sample);
     }
+    text.number("LARGEST", largest);
+    text.number("MOST_HELD", detail::clipped(config.limits.upper));
+    text.number("LEAST_HELD", detail::clipped(config.limits.lower));
     text.features({{"ESOKIT_LAGS", Order == 2},
                    {"ESOKIT_DELAYED", numbers.delay > 0},
                    {"ESOKIT_NEGATIVE", config.input_gain < S(0)}});
     const auto delay = static_cast<std::size_t>(numbers.delay);
-    text.counts({{"COUNT", count},
-                 {"DELAY", delay},
-                 {"PLACES", delay * count},
-                 {"COLUMNS", count + 2},
-                 {"SAMPLES", vectors.size()}});
+    text.counts(
+        {{"COUNT", count}, {"DELAY", delay}, {"PLACES", delay * count}, {"COLUMNS", count + 3}});
+    text.constant("SAMPLES", std::to_string(vectors.size()));
     text.constant("ORDER", std::to_string(Order));
     text.number("SAMPLE_TIME", config.sample_time);
     text.number("POLE", config.pole);

@@ -2,6 +2,7 @@
 /// to_c of a TimeProportioned: a relay's output as C99.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <esokit/control/time_proportioned.hpp>
 #include <esokit/core/expected.hpp>
@@ -12,6 +13,7 @@
 #include <esokit/target/detail/recorded_design.hpp>
 #include <esokit/target/detail/runtime_text.hpp>
 #include <esokit/target/structured_text.hpp>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -38,17 +40,27 @@ Expected<CCode, Error<S>> to_c(const TimeProportioned<S>& output, const CodeOpti
   const auto fill = [&](detail::RuntimeText& text) {
     const auto numbers = detail::RecordAccess::proportioned(output);
     const S range = numbers.on - numbers.off;
+    constexpr S largest = (std::numeric_limits<S>::max)();
     TimeProportioned<S> simulated = output;
-    std::vector<std::array<S, 3>> vectors;
-    S u = numbers.off;
+    // Windows with each share of time, and near what is too short; then samples of them.
+    constexpr std::array<double, 20> shares{0,    1,   0.03, 0.07, 0.93, 0.97, 1.1, 0.98, 0.96, 0.5,
+                                            -0.1, 0.1, 0.2,  0.4,  0.25, 0.04, 0.6, 0.8,  0.9,  4};
+    constexpr int infinite = 19;
+    std::vector<std::array<S, 4>> vectors;
     for (int k = 0; k < options.self_test_samples; ++k) {
-      if (simulated.begins()) {
-        u = detail::clipped(S(numbers.off + range * (S(k % 13) / S(10) - S(1) / S(10))));
-      }
-      const bool is_on = simulated.update(u);
-      vectors.push_back({u, S(is_on ? 1 : 0), simulated.applied()});
+      const int at = k % static_cast<int>(shares.size());
+      const S share = static_cast<S>(shares[static_cast<std::size_t>(at)]);
+      const S u = detail::clipped(S(numbers.off + range * share));
+      const S given = k == infinite ? S(S(4) * largest) : u;
+      const int times = k <= infinite ? (std::min)(numbers.window, 100000) : 1;
+      int on = 0;
+      for (int left = times; left > 0; --left) on += simulated.update(given) ? 1 : 0;
+      vectors.push_back({k == infinite ? S(4) : u, static_cast<S>(times),
+                         static_cast<S>(simulated.begins() ? -on : on), simulated.applied()});
     }
-    text.count("SAMPLES", vectors.size());
+    text.constant("INFINITE", std::to_string(infinite));
+    text.number("LARGEST", largest);
+    text.constant("SAMPLES", std::to_string(vectors.size()));
     text.constant("WINDOW", std::to_string(numbers.window));
     text.constant("SHORTEST", std::to_string(numbers.shortest));
     text.constant("LONGEST", std::to_string(numbers.longest));

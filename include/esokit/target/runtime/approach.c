@@ -154,27 +154,57 @@ real esokit_feed(const esokit_state *o)
 }
 
 #ifdef ESOKIT_SELF_TEST
+#define CALL_UPDATES 0u
+#define CALL_UPDATES_TO_INFINITY 1u
+#define CALL_STARTS_AT_INFINITY 3u
+#define CALL_STARTS_BY_INFINITY 4u
+#define CALL_STARTS_HIGH 5u
+#define CALL_STARTS_LOW 6u
+
+static void called(esokit_state *o, unsigned call, real target)
+{
+  real infinite = LARGEST;
+  real u = 0.0;
+  infinite = 4.0 * infinite;
+  if (call == CALL_STARTS_HIGH) {
+    u = MOST_HELD;
+  }
+  if (call == CALL_STARTS_LOW) {
+    u = LEAST_HELD;
+  }
+  if (call == CALL_STARTS_BY_INFINITY) {
+    u = infinite;
+  }
+  if (call == CALL_UPDATES) {
+    (void)esokit_update(o, target);
+  } else if (call == CALL_UPDATES_TO_INFINITY) {
+    (void)esokit_update(o, infinite);
+  } else {
+    (void)esokit_start(o, (call == CALL_STARTS_AT_INFINITY) ? infinite : target, u);
+  }
+}
+
 int esokit_self_test(real tolerance)
 {
-  static const real samples[SAMPLES][COLUMNS] = { /* target, feed, motion */
+  static const real samples[SAMPLES][COLUMNS] = { /* target, what is called, feed, motion */
     DESIGN_VECTORS
   };
   esokit_state o;
-  unsigned i;
-  unsigned k;
+  int wrong = 0;
+  int i;
   (void)esokit_start(&o, 0.0, 0.0);
-  for (i = 0u; i < SAMPLES; ++i) {
-    (void)esokit_update(&o, samples[i][0]);
-    if (!(fabs(o.feed - samples[i][1]) <= tolerance)) {
-      return (int)i + 1;
-    }
+  for (i = 0; (i < SAMPLES) && (wrong == 0); ++i) {
+    real motion[COUNT];
+    unsigned k;
+    called(&o, (unsigned)samples[i][1], samples[i][0]);
+    esokit_motion(&o, motion);
+    bool same = fabs(esokit_feed(&o) - samples[i][2]) <= tolerance;
     for (k = 0u; k < COUNT; ++k) {
-      if (!(fabs(o.motion[k] - samples[i][k + 2u]) <= tolerance)) {
-        return (int)i + 1;
-      }
+      same = same && (fabs(motion[k] - samples[i][k + 3u]) <= tolerance);
     }
+    wrong = same ? 0 : (i + 1);
   }
-  return 0;
+  return wrong;
 }
 #endif
 #ifdef __cplusplus

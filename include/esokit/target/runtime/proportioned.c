@@ -90,25 +90,31 @@ real esokit_applied(const esokit_state *o)
 #ifdef ESOKIT_SELF_TEST
 int esokit_self_test(real tolerance)
 {
-  static const real samples[SAMPLES][3] = { /* u, whether on, applied */
+  static const real samples[SAMPLES][4] = { /* u, how often, how often on (-: then a window begins), applied */
     DESIGN_VECTORS
   };
   esokit_state o;
-  unsigned i;
+  int wrong = 0;
+  int i;
   esokit_reset(&o);
-  for (i = 0u; i < SAMPLES; ++i) {
-    real is_on = 0.0;
-    if (esokit_update(&o, samples[i][0])) {
-      is_on = 1.0;
+  for (i = 0; (i < SAMPLES) && (wrong == 0); ++i) {
+    const real u = (i == INFINITE) ? (samples[i][0] * LARGEST) : samples[i][0];
+    real on = 0.0;
+    uint32_t left = (uint32_t)samples[i][1];
+    while (left > 0u) {
+      if (esokit_update(&o, u)) {
+        on = on + 1.0;
+      }
+      left = left - 1u;
     }
-    if (!(fabs(is_on - samples[i][1]) <= 0.5)) {
-      return (int)i + 1;
+    if (esokit_begins(&o)) {
+      on = -on;
     }
-    if (!(fabs(esokit_applied(&o) - samples[i][2]) <= tolerance)) {
-      return (int)i + 1;
-    }
+    const bool same = (fabs(on - samples[i][2]) <= 0.5) &&
+      (fabs(esokit_applied(&o) - samples[i][3]) <= tolerance);
+    wrong = same ? 0 : (i + 1);
   }
-  return 0;
+  return wrong;
 }
 #endif
 #ifdef __cplusplus
