@@ -200,6 +200,7 @@
 #include <esokit/target/detail/fixed_builder.hpp>
 #include <esokit/target/detail/fixed_design.hpp>
 #include <esokit/target/detail/fixed_record.hpp>
+#include <esokit/target/detail/health_test.hpp>
 #include <esokit/target/detail/integer_list.hpp>
 #include <esokit/target/detail/linear_call.hpp>
 #include <esokit/target/detail/list_writer.hpp>
