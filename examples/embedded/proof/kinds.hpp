@@ -69,6 +69,12 @@ auto observer_of() {
     config.input_gain = V(50);
     config.sample_time = V(1e-3);
     config.max_gap = 3;
+    if constexpr (requires { config.shape.gain_alpha; }) {
+      config.shape.gain_alpha = V(0.6);
+      config.shape.alpha = V(0.75);
+      config.shape.gain_beta = V(0.25);
+      config.shape.beta = V(0.5);
+    }
     if constexpr (requires { config.bandwidth_factor; }) config.bandwidth_factor = V(1.5);
     if constexpr (requires { config.model.actuator.time_constant; }) {
       config.model.actuator.time_constant = V(0.01);

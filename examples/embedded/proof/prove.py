@@ -55,7 +55,6 @@ BROKEN_STEP = (
 NOT_PROVEN = {
     "`Guarded`": "stopped after 75 s without an answer",
     "`HealthMonitor`": "stopped after 75 s without an answer",
-    "`NonlinearEso`": "u is, its numbers are not seen to be finite",
     "`AlgebraicEso`, while its gain changes": "not tried to its end",
     "`ExtendedStateFilter`": "not tried to its end",
     "`PlantEso`, `ModelEso` with a sinusoid": "not tried to its end",

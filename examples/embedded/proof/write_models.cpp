@@ -7,6 +7,7 @@
 #include <esokit/observer/half_gain_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/model_eso.hpp>
+#include <esokit/observer/nonlinear_eso.hpp>
 #include <esokit/observer/reduced_order_eso.hpp>
 
 #include "kinds.hpp"
@@ -23,6 +24,7 @@ void write_models_and_laws() {
   write_controller<Adrc<ReducedOrderEso<2, float>>>("reduced", "`ReducedOrderEso<2, float>`");
   write_controller<Adrc<AdjustableBandwidthEso<2, float>>>("adjustable",
                                                            "`AdjustableBandwidthEso`");
+  write_controller<Adrc<NonlinearEso<2, float>>>("nonlinear", "`NonlinearEso<2, float>`");
   write_controller<Adrc<ModelEso<lag, float>>>("lag", "`ModelEso` with a lag of u");
   write_controller<DisturbanceCompensator<LinearEso<2, float>>>("compensator",
                                                                 "`DisturbanceCompensator`");
