@@ -1,6 +1,6 @@
 # Files that are one translation unit and one program with ESOKIT_TESTS_TOGETHER: a program a line, called
 # by its first file. Those that instantiate the same types sit together (chosen by the code that their
-# programs had in common), as many as GCC compiles within some 1.5 GB. Of one line: either law suites, or
+# programs had in common), as many as GCC compiles within some 2 GB. Of one line: either law suites, or
 # tests that count allocations (support/no_allocation.hpp, which replaces operator new), or neither. A file
 # in no line is by itself.
 set(esokit_units
@@ -29,5 +29,8 @@ set(esokit_units
     "observer/algebraic_eso_laws observer/extended_state_filter_laws observer/model_eso_laws observer/model_parts_laws observer/nonlinear_eso_laws"
     "sim/closed_loop sim/dormand_prince sim/metrics sim/noise sim/plant sim/refused_config sim/runge_kutta sim/signals"
     "sim/counted_gaussian sim/run sim/study_records"
+    "target/c_boundary target/c_code target/c_self_test"
+    "target/c_guarded target/c_mapped"
+    "target/c_reference target/c_resting target/c_saved target/c_state"
     "target/health_code target/profile_code target/time_proportioned_code"
     "tune/pid_conversion tune/tune tune/update_operations")
