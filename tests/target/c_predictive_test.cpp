@@ -165,6 +165,59 @@ void predicts(
   }
 }
 
+/// It is written with its state, and what was said since the last sample: the C goes on where it
+/// is.
+/// @param word 1: then it is started, 2: the actuator holds another u
+template <class C>
+void goes_on(std::uint64_t seed, int before, int word) {
+  SCOPED_TRACE(testing::internal::GetTypeName<C>() + std::to_string(before));
+  using V = typename C::scalar_type;
+  using Observer = std::remove_cvref_t<decltype(std::declval<C>().observer())>;
+  typename C::Config config{};
+  config.observer = observer_config<Observer>(8);
+  config.controller_bandwidth = V(4);
+  config.limits = {V(-3), V(2.5), V(60)};
+  config.start_hold = V(0.1);  // 13 samples
+  C mine = C::make(config).value();
+  Random random(seed);
+  const auto measurement = [&] { return static_cast<V>(random.uniform(-0.1, 0.1)); };
+  for (int k = 0; k < before; ++k) {
+    (void)mine.control(measurement());
+    (void)mine.prepare(V(0.5));
+  }
+  if (word == 1) EXPECT_EQ(mine.start(V(0.25), V(0.5)), StepStatus::ok);
+  if (word == 2) EXPECT_EQ(mine.applied(V(0.75)), StepStatus::ok);
+  const Folder folder;
+  InTwoPhases<V> in_c(folder, to_c(mine, {.name = "loop"}).value());
+  ASSERT_TRUE(in_c.loaded());
+  EXPECT_EQ(in_c.self_test(), 0);
+  for (int k = 0; k < 500 && !testing::Test::HasFailure(); ++k) {
+    const V y = measurement();
+    if (word == 1 && k == 0) {  // it goes on being the operator's
+      EXPECT_EQ(static_cast<unsigned>(mine.applied(V(-0.5))), in_c.applied(V(-0.5)));
+    }
+    EXPECT_TRUE(equal_bits(mine.control(y), in_c.control(y))) << k;
+    EXPECT_EQ(static_cast<unsigned>(mine.prepare(V(-0.5))), in_c.prepare(V(-0.5))) << k;
+    detail::unroll<Observer::size>([&](auto row) {
+      EXPECT_TRUE(
+          equal_bits(V(mine.observer().template estimate<row>()), in_c.estimate(unsigned{row})))
+          << k;
+    });
+  }
+}
+
+TEST(CPredictive, GoesOnWhereItIs) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  for (const int before : {0, 5, 13, 300}) {
+    for (const int word : {0, 1, 2})
+      goes_on<PredictiveAdrc<LinearEso<2, double>>>(981, before, word);
+  }
+#ifndef ESOKIT_ONE_TYPE
+  goes_on<PredictiveAdrc<ExtendedStateFilter<1, float>>>(991, 40, 0);
+  goes_on<PredictiveAdrc<AlgebraicEso<1, float>>>(1001, 40, 0);
+#endif
+}
+
 TEST(CPredictive, EqualsTheController) {
   if (!there("gcc")) GTEST_SKIP() << "no gcc";
   predicts<PredictiveAdrc<LinearEso<2, double>>>(801);

@@ -142,6 +142,7 @@ typedef double real;
 #define DESIGN_NUMBER 0x1234abcdu
 #define MISSING_LIMIT 10u
 #define HOLD_SAMPLES 13u
+#define FIRST_HOLD 5u
 #define FIRST_MODE 1u
 #define FIRST_PHASE 0u
 #define FIRST_ELSEWHERE 1u

@@ -266,6 +266,7 @@ struct RecordAccess {
   static LoopRules rules_of_phases(const C& c) noexcept {
     LoopRules rules;
     rules.hold_left = c.hold_left_;
+    rules.hold = c.set_.hold;
     rules.missing_limit = c.set_.missing_limit;
     rules.holds_safe = c.set_.hold_safe;
     rules.stays_safe = c.set_.stay_safe;

@@ -53,6 +53,7 @@ struct LoopRules {
   double safe_input = 0;
   bool elsewhere = false;  ///< the last u was commanded by something else
   double kept = 0;         ///< the last u, if the actuator holds another, too
+  unsigned hold = 0;       ///< samples of the hold that a reset begins
 };
 
 /// An OutlierGate: its settings, and what it has seen.

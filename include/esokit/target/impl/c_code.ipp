@@ -169,7 +169,7 @@ class CDesign {
                                     : (std::numeric_limits<double>::max)();
     const auto bridged = static_cast<std::size_t>(d.max_gap) + 1;
     const std::size_t rows = d.recovery.empty() ? bridged : d.recovery.size();
-    const unsigned hold = d.loop.hold_left;
+    const unsigned hold = (std::max)(d.loop.hold, d.loop.hold_left);
     text_.feature("ESOKIT_HOLDS_AT_START", hold > 0);
     text_.numbers({{"SAMPLE_TIME", d.sample_time}, {"LARGEST", largest}});
     text_.counts({{"ROWS", rows},
@@ -184,6 +184,7 @@ class CDesign {
                   {"MISSING_LIMIT", d.loop.missing_limit}});
     text_.constant("DESIGN_NUMBER", hash_.empty() ? "0u" : "0x" + hash_ + "u");
     text_.counts({{"HOLD_SAMPLES", hold},
+                  {"FIRST_HOLD", d.loop.hold_left},
                   {"FIRST_MODE", d.mode()},
                   {"FIRST_PHASE", d.loop.elsewhere ? 5 : 0},
                   {"FIRST_ELSEWHERE", d.loop.elsewhere ? 1 : 0}});

@@ -77,7 +77,7 @@ void esokit_init(esokit_state *o)
   DESIGN_INIT
   o->measurement = 0.0;
   o->u_held = 0.0;
-  o->hold_left = HOLD_SAMPLES;
+  o->hold_left = FIRST_HOLD;
   up_to_date(o);
   o->mode = FIRST_MODE;
   o->phase = FIRST_PHASE;
