@@ -208,10 +208,9 @@ void goes_on(std::uint64_t seed, int before, int word) {
 
 TEST(CPredictive, GoesOnWhereItIs) {
   if (!there("gcc")) GTEST_SKIP() << "no gcc";
-  for (const int before : {0, 5, 13, 300}) {
-    for (const int word : {0, 1, 2})
-      goes_on<PredictiveAdrc<LinearEso<2, double>>>(981, before, word);
-  }
+  using Plain = PredictiveAdrc<LinearEso<2, double>>;
+  for (const int before : {0, 5}) goes_on<Plain>(981, before, 0);
+  for (const int word : {0, 1, 2}) goes_on<Plain>(982, 300, word);
 #ifndef ESOKIT_ONE_TYPE
   goes_on<PredictiveAdrc<ExtendedStateFilter<1, float>>>(991, 40, 0);
   goes_on<PredictiveAdrc<AlgebraicEso<1, float>>>(1001, 40, 0);

@@ -24,7 +24,8 @@ FILES = ROOT / "include/esokit/target/runtime"
 # The tests near to each file: program, filter. The lightest first.
 NEAR = {
     "approach.c": [("profile_code", "*Approach*")],
-    "angle.c": [("c_running", "*OfAnglesByTurns"), ("c_running", "*OfAnglesByTurnsAroundAGate")],
+    "angle.c": [("c_running", "*OfAnglesByTurns"), ("c_running", "*OfAnglesByTurnsAroundAGate"),
+                ("c_state", "*OfObservers")],
     "controller.c": [("c_code", "*OfALinearObserverInFloat:*OfAnObserverAlone:*OfWhatIsSafe:*OfNoneMissing"),
                      ("c_kinds", "*OfDelaysAndOtherForms"), ("c_guarded", "*OfPinHoldAndGain"),
                      ("c_saved", "*")],
