@@ -32,10 +32,13 @@ class FixedBuilder : public FixedRecord {
   };
 
   /// A power of two times a small odd number.
-  static bool is_short(double c, int& odd, int& exponent);
-
-  static bool is_short(const Term& one, int& odd, int& exponent) {
-    return !one.varies && is_short(one.coefficient, odd, exponent);
+  struct Short {
+    bool is = false;
+    int odd = 0, exponent = 0;
+  };
+  static Short short_of(double c);
+  static Short short_of(const Term& one) {
+    return one.varies ? Short{} : short_of(one.coefficient);
   }
 
   /// Builds one recorded call.
@@ -65,9 +68,7 @@ class FixedBuilder : public FixedRecord {
     }
     /// Whether a number is short whatever the settings are.
     [[nodiscard]] bool stays_short(int i) const {
-      int odd = 0;
-      int exponent = 0;
-      return !forms.varies[static_cast<std::size_t>(i)] && is_short(forms.number(i), odd, exponent);
+      return !forms.varies[static_cast<std::size_t>(i)] && short_of(forms.number(i)).is;
     }
     static void add(std::vector<Term>& terms, const Term& more) {
       for (Term& term : terms) {
@@ -183,17 +184,15 @@ class FixedBuilder : public FixedRecord {
       const auto* given = input_of(one.node);
       const double c = one.coefficient * (given == nullptr ? 1.0 : given->first);
       const Value v = value(one.node);
-      int odd = 0;
-      int exponent = 0;
-      if (!one.varies && is_short(c, odd, exponent)) {
+      if (const Short by = short_of(c); !one.varies && by.is) {
         negative = c < 0;
         Value shifted = v;
-        shifted.scale -= exponent;
-        for (double& x : shifted.form) x = std::ldexp(x, exponent);
-        if (odd == 1) return shifted;
+        shifted.scale -= by.exponent;
+        for (double& x : shifted.form) x = std::ldexp(x, by.exponent);
+        if (by.odd == 1) return shifted;
         const Value fitting =
             list->to_scale(shifted, (std::min)(shifted.scale, scale + 2), of->rounds_);
-        return list->times(fitting, odd, fitting.scale);
+        return list->times(fitting, by.odd, fitting.scale);
       }
       return product(c, v, given == nullptr ? 0 : given->second, scale, full, one.varies, negative);
     }
@@ -239,11 +238,9 @@ class FixedBuilder : public FixedRecord {
     [[nodiscard]] int natural(const std::vector<Term>& terms, bool finest, int* root = nullptr) {
       int found = none;
       for (const Term& one : terms) {
-        int odd = 0;
-        int exponent = 0;
-        if (input_of(one.node) != nullptr) continue;
-        if (!is_short(one, odd, exponent)) continue;
-        const int s = value(one.node).scale - exponent;
+        const Short by = short_of(one);
+        if (!by.is || input_of(one.node) != nullptr) continue;
+        const int s = value(one.node).scale - by.exponent;
         if (found != none && (finest ? s <= found : s >= found)) continue;
         found = s;
         if (root == nullptr) continue;

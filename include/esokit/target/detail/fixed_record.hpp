@@ -53,6 +53,8 @@ class FixedRecord {
   [[nodiscard]] std::size_t states() const { return numbers.size(); }
   [[nodiscard]] const RecordedDesign& design() const { return *design_; }
   [[nodiscard]] const FixedPointOptions& options() const { return options_; }
+  /// A count of u in counts of y.
+  [[nodiscard]] double of_u() const { return options_.u.unit / options_.y.unit; }
   /// u of the start hold, in counts.
   [[nodiscard]] std::int64_t hold_counts() const {
     return static_cast<std::int64_t>(std::nearbyint(design_->loop.hold_input / options_.u.unit));
@@ -128,7 +130,6 @@ class FixedRecord {
   WorstCase plain_;  ///< of the design itself
   bool again_ = false;
   bool rounds_ = false;  ///< shifts round: a number more to add
-  double of_u_ = 1;
   static constexpr int owner_of_narrow_ = 900000;
 };
 

@@ -96,8 +96,7 @@ class IntegerList {
   }
 
   /// The results for given words, remainders and arguments; each in 64 bits, which no list reaches.
-  /// @return whether all fit into 32 bits
-  bool run(const std::vector<std::int64_t>& words, const std::vector<std::int64_t>& remainders,
+  void run(const std::vector<std::int64_t>& words, const std::vector<std::int64_t>& remainders,
            const std::vector<std::int64_t>& arguments, std::vector<std::int64_t>& results) const;
 
   /// A line as an expression of C. @param setting what holds its constant, if it is one

@@ -12,17 +12,17 @@
 
 namespace esokit::detail {
 
-ESOKIT_FUNCTION bool FixedBuilder::is_short(double c, int& odd, int& exponent) {
+ESOKIT_FUNCTION FixedBuilder::Short FixedBuilder::short_of(double c) {
+  int exponent = 0;
   double mantissa = std::frexp(std::fabs(c), &exponent);
   for (int bits = 0; bits < 3; ++bits) {
     mantissa *= 2;
     --exponent;
     if (std::fabs(mantissa - std::nearbyint(mantissa)) <= 0) {
-      odd = static_cast<int>(std::nearbyint(mantissa));
-      return true;
+      return {true, static_cast<int>(std::nearbyint(mantissa)), exponent};
     }
   }
-  return false;
+  return {};
 }
 
 ESOKIT_FUNCTION int FixedBuilder::state_of_argument(int argument) const {
@@ -47,7 +47,6 @@ ESOKIT_FUNCTION void FixedBuilder::build(const std::vector<bool>& keeps) {
   }
   const RecordedCall& call = called("observe");
   const std::vector<double> given{column, column};
-  of_u_ = options_.u.unit / options_.y.unit;
   Builder builder{this,
                   &call,
                   linear(call, given),
@@ -55,7 +54,7 @@ ESOKIT_FUNCTION void FixedBuilder::build(const std::vector<bool>& keeps) {
                   static_cast<int>(2 * n),
                   1,
                   options_.innovation_bits == 16,
-                  {{1.0, options_.y.most}, {of_u_, options_.u.most}}};
+                  {{1.0, options_.y.most}, {of_u(), options_.u.most}}};
   std::vector<int> wanted;
   for (std::size_t i = 0; i < n; ++i) wanted.push_back(call.next[numbers[i]]);
   builder.find_kept(wanted);
@@ -126,8 +125,7 @@ ESOKIT_FUNCTION void FixedBuilder::build_row(Builder& b, std::size_t i, int node
       bool negative = false;
       int product = Builder::none;
       for (const Term& t : others) {
-        int odd = 0, exponent = 0;
-        if (is_short(t, odd, exponent) || b.input_of(t.node) != nullptr) continue;
+        if (short_of(t).is || b.input_of(t.node) != nullptr) continue;
         product = (std::min)(product, b.term(t, s, true, negative).scale);
       }
       int scale = (std::min)(fine, product);

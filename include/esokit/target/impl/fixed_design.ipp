@@ -111,7 +111,7 @@ ESOKIT_FUNCTION bool FixedDesign::finds_system() {
   if (!first_of_level.empty()) {
     const auto rows = rows_of("predict_step", {column});
     for (const std::size_t i : first_of_level) {
-      double change = std::fabs(rows[i][n]) * of_u_ * options_.u.most;
+      double change = std::fabs(rows[i][n]) * of_u() * options_.u.most;
       for (std::size_t j = 0; j < n; ++j) change += j == i ? 0 : std::fabs(rows[i][j]) * reach[j];
       reach[i] += change * static_cast<double>(table_rows());
     }

@@ -20,7 +20,7 @@ namespace detail {
 
 ESOKIT_FUNCTION void FixedPlayer::observe(std::int64_t y, std::int64_t u) {
   std::vector<std::int64_t> results;
-  (void)design_->update.run(words_, rests_, {y, u}, results);
+  design_->update.run(words_, rests_, {y, u}, results);
   for (std::size_t i = 0; i < words_.size(); ++i) {
     words_[i] = results[static_cast<std::size_t>(design_->next[i])];
     const int rest = design_->next_rest[i];
@@ -37,7 +37,7 @@ ESOKIT_FUNCTION std::int64_t FixedPlayer::control(std::int64_t r) {
     --hold_left_;
   } else {
     std::vector<std::int64_t> results;
-    (void)design_->law.run(words_, rests_, {r}, results);
+    design_->law.run(words_, rests_, {r}, results);
     u = results[static_cast<std::size_t>(design_->law_line)];
   }
   if (design_->rate > 0) {
@@ -132,14 +132,11 @@ class FixedText {
     for (const int i : wanted) {
       if (i >= 0) need[static_cast<std::size_t>(i)] = true;
     }
-    std::vector<int> uses(list.lines.size(), 0);
     for (std::size_t i = list.lines.size(); i-- > 0;) {
       const IntegerLine& one = list.lines[i];
       if (!need[i] || one.operation <= IntegerOperation::argument) continue;
       for (const int part : {one.a, one.b}) {
-        if (part < 0) continue;
-        need[static_cast<std::size_t>(part)] = true;
-        ++uses[static_cast<std::size_t>(part)];
+        if (part >= 0) need[static_cast<std::size_t>(part)] = true;
       }
     }
     std::string text;
@@ -336,7 +333,6 @@ class FixedText {
   void set_rest() {
     const std::size_t n = d_.states();
     const bool wraps = d_.wraps();
-    const double of_u = d_.options().u.unit / d_.options().y.unit;
     std::vector<LinearForm> at(n, LinearForm(n + 2, 0.0));
     if (design_.is_controller) {
       at = d_.rows_of("rest_at", {FixedDesign::column, FixedDesign::column});
@@ -350,7 +346,7 @@ class FixedText {
       const double scale = std::ldexp(1.0, d_.written.scale[i]);
       for (int input = wraps ? 1 : 0; input < 2; ++input) {
         const double c =
-            at[i][n + static_cast<std::size_t>(input)] * (input == 0 ? 1.0 : of_u) * scale;
+            at[i][n + static_cast<std::size_t>(input)] * (input == 0 ? 1.0 : d_.of_u()) * scale;
         if (!(std::fabs(c) > 0)) continue;
         const auto [mantissa, power] = split(c);
         sum += (sum.empty() ? "" : " + ") + std::string("((") + (input == 0 ? "y" : "u") +
@@ -387,10 +383,9 @@ class FixedText {
     text_.lines("DESIGN_ESTIMATES", estimates);
   }
   void set_tables() {
-    const double of_u = d_.options().u.unit / d_.options().y.unit;
     std::string m;
     std::string powers;
-    matrix(d_.rows_of("predict_step", {FixedDesign::column}), of_u, m, powers, "    ");
+    matrix(d_.rows_of("predict_step", {FixedDesign::column}), d_.of_u(), m, powers, "    ");
     text_.lines("DESIGN_PREDICT_M", m);
     text_.lines("DESIGN_PREDICT_P", powers);
     for (int row = 0; row < d_.table_rows(); ++row) {

@@ -172,7 +172,6 @@ ESOKIT_FUNCTION bool FixedRecord::takes_design() {
   const std::size_t n = states();
   const RecordedCall& call = called("observe");
   const LinearCall forms = linear(call, {column, column});
-  const double of_u = options_.u.unit / options_.y.unit;
   exact_a_.clear();
   exact_by_.clear();
   exact_bu_.clear();
@@ -185,7 +184,7 @@ ESOKIT_FUNCTION bool FixedRecord::takes_design() {
     const LinearForm& form = forms.of[static_cast<std::size_t>(at)];
     for (std::size_t j = 0; j < n; ++j) exact_a_.push_back(form[j]);
     exact_by_.push_back(form[n]);
-    exact_bu_.push_back(form[n + 1] * of_u);
+    exact_bu_.push_back(form[n + 1] * of_u());
   }
   plain_by_ = exact_by_;
   if (wraps_) {

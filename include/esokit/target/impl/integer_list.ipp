@@ -86,12 +86,11 @@ ESOKIT_FUNCTION IntegerValue IntegerList::to_scale(const IntegerValue& a, int sc
                 : rounded(IntegerOperation::shift_down, a.line, down, scale, a.form, -1, 0);
 }
 
-ESOKIT_FUNCTION bool IntegerList::run(const std::vector<std::int64_t>& words,
+ESOKIT_FUNCTION void IntegerList::run(const std::vector<std::int64_t>& words,
                                       const std::vector<std::int64_t>& remainders,
                                       const std::vector<std::int64_t>& arguments,
                                       std::vector<std::int64_t>& results) const {
   results.assign(lines.size(), 0);
-  bool fits = true;
   for (std::size_t i = 0; i < lines.size(); ++i) {
     const IntegerLine& one = lines[i];
     const auto number = static_cast<std::size_t>(one.a);
@@ -138,9 +137,7 @@ ESOKIT_FUNCTION bool IntegerList::run(const std::vector<std::int64_t>& words,
         to = a() - floored(a(), c) * (std::int64_t(1) << c);
         break;
     }
-    fits = fits && -2147483647 <= to && to <= 2147483647;
   }
-  return fits;
 }
 
 ESOKIT_FUNCTION std::string IntegerList::in_c(const IntegerLine& one,
