@@ -16,7 +16,7 @@ namespace target_c_state_test {
 
 #if ESOKIT_LOADS_C
 
-/// A swinging y, at times an outlier.
+/// An oscillating y, at times an outlier.
 template <class V>
 V measurement(Random& random, int k) {
   const double outlier = random.index(30) == 0 ? random.uniform(-1, 1) : 0;

@@ -32,6 +32,9 @@ inline constexpr const char* profile_header =
 inline constexpr const char* profile =
 #include <esokit/target/runtime/profile.c>
     ;
+inline constexpr const char* sum =
+#include <esokit/target/runtime/sum.c>
+    ;
 inline constexpr const char* approach_header =
 #include <esokit/target/runtime/approach.h>
     ;
@@ -40,9 +43,6 @@ inline constexpr const char* approach =
     ;
 inline constexpr const char* follow_header =
 #include <esokit/target/runtime/follow.h>
-    ;
-inline constexpr const char* sum =
-#include <esokit/target/runtime/sum.c>
     ;
 inline constexpr const char* follow =
 #include <esokit/target/runtime/follow.c>
@@ -266,8 +266,8 @@ Expected<CCode, Error<S>> to_c(const ApproachProfile<Order, Capacity, S>& profil
     text.number("DIGITS", S(S(8) * detail::rounding<S>()));
     text.lines("DESIGN_VECTORS", text.writer().rows(vectors));
   };
-  return detail::code_of<S>(options, detail::runtime::approach_header, {detail::runtime::approach},
-                            fill);
+  return detail::code_of<S>(options, detail::runtime::approach_header,
+                            {detail::runtime::sum, detail::runtime::approach}, fill);
 }
 
 /// The same as a function block in Structured Text, a call of which is a sample: its C, translated.

@@ -43,19 +43,6 @@ static real within(const esokit_state *o, real change, real place)
   return inside;
 }
 
-/* Loses no small change. */
-static void move(esokit_state *o, real change)
-{
-  o->rest = o->rest + change;
-  if (fabs(o->rest) <= (DIGITS * fabs(o->whole))) {
-    return;
-  }
-  const real sum = o->whole + o->rest;
-  const real taken = sum - o->whole;
-  o->rest = (o->whole - (sum - taken)) + (o->rest - taken);
-  o->whole = sum;
-}
-
 /* The motion of the dead time ago. */
 static void delay(esokit_state *o, const real now[COUNT])
 {
@@ -83,8 +70,8 @@ bool esokit_start(esokit_state *o, real y, real u)
     return false;
   }
   o->target = y;
-  o->whole = y;
-  o->rest = 0.0;
+  o->place.whole = y;
+  o->place.rest = 0.0;
 #if ESOKIT_LAGS
   o->behind = 0.0;
 #endif
@@ -110,12 +97,12 @@ bool esokit_start(esokit_state *o, real y, real u)
 bool esokit_update(esokit_state *o, real target)
 {
   const bool good = fits(target);
-  const real place = o->whole + o->rest;
+  const real place = o->place.whole + o->place.rest;
   real now[COUNT];
   if (good) {
     o->target = target;
   }
-  const real change = within(o, BY_BANDWIDTH * ((o->whole - o->target) + o->rest), place);
+  const real change = within(o, BY_BANDWIDTH * ((o->place.whole - o->target) + o->place.rest), place);
   const real speed = change / SAMPLE_TIME;
 #if ESOKIT_LAGS
   now[0] = place - o->behind;
@@ -126,7 +113,7 @@ bool esokit_update(esokit_state *o, real target)
   now[0] = place;
   now[1] = speed;
 #endif
-  move(o, change);
+  add(&o->place, change);
   delay(o, now);
   /* u is held for a sample: it needs what the middle of it does. */
   const real carried = POLE * ((place - o->begin) + (change / 2.0));

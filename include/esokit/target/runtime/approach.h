@@ -18,10 +18,15 @@ extern "C" {
 
 #define ESOKIT_ORDER ORDER
 
+/* A sum, and what its digits do not hold. */
+typedef struct {
+  real whole;
+  real rest;
+} esokit_sum;
+
 typedef struct {
   real target;
-  real whole; /* where the reference without the lag is, and what its digits do not hold */
-  real rest;
+  esokit_sum place; /* of the reference without the lag */
 #if ESOKIT_LAGS
   real behind; /* by how much the reference is behind it */
 #endif
