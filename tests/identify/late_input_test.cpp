@@ -109,6 +109,21 @@ TEST(LateInput, IntervalsHoldB0WhateverUWasBeforeTheLog) {
   EXPECT_LT(std::sqrt(square), 0.01);
 }
 
+// No b0 that the fastest rise of the log contradicts.
+TEST(Rise, BeyondWhatB0AllowsIsRefused) {
+  const Log log = thermostat({.late = false}, 7);
+  const auto found = study(log, first_order());
+  ASSERT_TRUE(found);
+  EXPECT_GT(found->rise, 0.4);
+  EXPECT_LT(found->rise, 1);
+  EXPECT_TRUE(judge(*found, log, first_order()));
+  Identified faster = *found;
+  faster.rise = 1.3;
+  const auto verdict = judge(faster, log, first_order());
+  ASSERT_FALSE(verdict);
+  EXPECT_STREQ(verdict.error().field, "rise");
+}
+
 // A machine under a PID whose reference stands still: u is a law of y, and y' = b0 (u - s y) with
 // the slope s of this law explains y by an unstable pole. Noise of y that is not white, and u
 // rounded, hide from one row to the next that u follows from y.

@@ -280,7 +280,8 @@ ESOKIT_FUNCTION Check<double> judge(const Identified& found, const Log& log,
                 "error does not tell b0 either: record longer, with steps of u that last until y "
                 "settles, or add known effects as columns; must be at most",
                 -1, detail::correlation_limit(found, options), true});
-  rules.demand(found.rise < 2.0, "rise", found.rise,
+  // Of 226 accepted logs of random machines one was above 1: its b0 was beyond its interval.
+  rules.demand(found.rise < 1.25, "rise", found.rise,
                "is how fast y rises and falls over what b0 times the range of u allows: something "
                "else moves y, or u was logged late; record u when it acts");
   rules.demand(!informed || second.agrees(found.input_gain.value),
