@@ -124,9 +124,9 @@ TEST(Rise, BeyondWhatB0AllowsIsRefused) {
   EXPECT_STREQ(verdict.error().field, "rise");
 }
 
-// A machine under a PID whose reference stands still: u is a law of y, and y' = b0 (u - s y) with
-// the slope s of this law explains y by an unstable pole. Noise of y that is not white, and u
-// rounded, hide from one row to the next that u follows from y.
+// A machine under a PID whose reference stands still: u is a law of y. With the slope s of this law
+// y' = b0 (u - s y) explains y by an unstable pole. Noise of y that is not white, and u rounded,
+// hide from one row to the next that u follows from y.
 TEST(Law, IsNotTakenForTheMachine) {
   sim::Gaussian noise(9);
   Log log;
