@@ -65,7 +65,14 @@ auto observer_of() {
       config.curve = decltype(config.curve)::dead_zone(V(0.5), V(0.25));
     }
   } else {
-    config.observer_bandwidth = V(100);
+    if constexpr (requires { config.observer_bandwidth; }) {
+      config.observer_bandwidth = V(100);
+    } else {
+      config.measurement_variance = V(1e-6);
+      config.disturbance_bounds[Observer::size - 1] = V(0.5);
+      config.inflation = V(0.02);
+    }
+    if constexpr (requires { config.frequency_shift; }) config.frequency_shift = V(20);
     config.input_gain = V(50);
     config.sample_time = V(1e-3);
     config.max_gap = 3;
@@ -78,6 +85,14 @@ auto observer_of() {
     if constexpr (requires { config.bandwidth_factor; }) config.bandwidth_factor = V(1.5);
     if constexpr (requires { config.model.actuator.time_constant; }) {
       config.model.actuator.time_constant = V(0.01);
+    }
+    if constexpr (requires { decltype(config.model.plant)::chain; }) {
+      using Plant = decltype(config.model.plant);
+      config.model.plant =
+          Plant::chain({.coefficients = {V(0.5), V(0.5)}, .input_gain = V(50)}).value();
+    }
+    if constexpr (requires { config.model.resonators; }) {
+      for (auto& resonance : config.model.resonators) resonance.frequency = V(25);
     }
   }
   return config;
