@@ -185,8 +185,12 @@ void goes_on(std::uint64_t seed, int before, int word) {
     (void)mine.control(measurement());
     (void)mine.prepare(V(0.5));
   }
-  if (word == 1) EXPECT_EQ(mine.start(V(0.25), V(0.5)), StepStatus::ok);
-  if (word == 2) EXPECT_EQ(mine.applied(V(0.75)), StepStatus::ok);
+  if (word == 1) {
+    EXPECT_EQ(mine.start(V(0.25), V(0.5)), StepStatus::ok);
+  }
+  if (word == 2) {
+    EXPECT_EQ(mine.applied(V(0.75)), StepStatus::ok);
+  }
   const Folder folder;
   InTwoPhases<V> in_c(folder, to_c(mine, {.name = "loop"}).value());
   ASSERT_TRUE(in_c.loaded());

@@ -73,7 +73,9 @@ void goes_on(std::uint64_t seed, bool is_same = true) {
     ASSERT_TRUE(in_c.loaded());
     EXPECT_EQ(in_c.self_test(V(0)), 0);
     compare_estimates(observer, in_c, before);
-    if (is_same) EXPECT_EQ(beside.state(), in_c.state()) << before;
+    if (is_same) {
+      EXPECT_EQ(beside.state(), in_c.state()) << before;
+    }
     for (int k = before; k < before + 500 && !testing::Test::HasFailure(); ++k) {
       tell(k, &in_c);
       const V y = measurement<V>(random, k);
