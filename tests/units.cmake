@@ -30,7 +30,6 @@ set(esokit_units
     "sim/closed_loop sim/dormand_prince sim/metrics sim/noise sim/plant sim/refused_config sim/runge_kutta sim/signals"
     "sim/counted_gaussian sim/run sim/study_records"
     "target/c_boundary target/c_code target/c_self_test"
-    "target/c_guarded target/c_mapped"
     "target/c_reference target/c_resting target/c_saved target/c_state"
     "target/health_code target/profile_code target/time_proportioned_code"
     "tune/pid_conversion tune/tune tune/update_operations")
