@@ -185,6 +185,20 @@ TEST(HealthCode, IsTested) {
           0.0F);
 }
 
+/// A monitor that settles in days: the sanitizers look at what counts its samples.
+TEST(HealthCode, IsWrittenHoweverSlow) {
+  using C = Adrc<LinearEso<1, float>>;
+  const auto loop = C::make(config<C>(8)).value();
+  for (const float omega : {1e-6F, 1e-9F}) {
+    const auto slow = HealthMonitor<2, float>::make({.observer_bandwidth = omega,
+                                                     .sample_time = 1e-3F,
+                                                     .input_range = 5,
+                                                     .memory = 100 / omega});
+    ASSERT_TRUE(slow) << slow.error().rule;
+    EXPECT_TRUE(to_c(*slow, loop, {.name = "loop", .self_test_samples = 2}));
+  }
+}
+
 TEST(HealthCode, EqualsTheMonitor) {
   if (!there("gcc")) GTEST_SKIP() << "no gcc";
   using C = Adrc<LinearEso<2, double>>;

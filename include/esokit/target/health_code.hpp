@@ -80,7 +80,8 @@ requires std::same_as<S, typename Controller::scalar_type> Expected<CCode, Error
              {"ONE_SIDE", 0.8}}) {
       text.constant(name, in_double.number(x));
     }
-    const int late = static_cast<int>(static_cast<S>(Size * settings.divider) / settings.step);
+    const int late =
+        detail::bounded_samples(S(static_cast<S>(Size * settings.divider) / settings.step));
     const auto rows = detail::watched_self_test<S>(
         monitor, controller, settings.range, settings.middle, settings.step, S(1) / settings.weight,
         settings.divider, late, options.self_test_samples);

@@ -22,9 +22,9 @@ struct WatchedRow {
   S applied{};  ///< its mean,
   S moves{};    ///< and what way adds
   S disturbance{};
-  S beyond{};  ///< u that was asked, beyond what was held
-  S swings{};  ///< the same, by way
-  S slope{};   ///< of the estimate and the measurement, each i
+  S beyond{};      ///< u that was asked, beyond what was held
+  S oscillates{};  ///< the same, by way
+  S slope{};       ///< of the estimate and the measurement, each i
   S innovation{};
   S status{};
   S missed{};
@@ -78,7 +78,7 @@ class WatchedSample {
     observer_.missed_ = static_cast<int>(row.missed);
     status_ = static_cast<StepStatus>(static_cast<unsigned>(row.status));
     stops_ = row.stops > S(0);
-    asked_ = S(limiter_.last() + S(row.beyond + S(row.swings * way)));
+    asked_ = S(limiter_.last() + S(row.beyond + S(row.oscillates * way)));
   }
   [[nodiscard]] const Observer& observer() const { return observer_; }
   [[nodiscard]] LoopMode mode() const { return stops_ ? LoopMode::safe : LoopMode::running; }
@@ -114,7 +114,6 @@ std::vector<WatchedRow<S>> watched_rows(S range, S middle, S gain, S half, S mem
     return row;
   };
   const auto remembered = [&](WatchedRow<S>& row) { row.times = memory; };
-  const S swing = S(range);
   // What no u and no plant cause: it clears the sums.
   const auto absurd = changed(moved(S(0.5), S(1)), [&](auto& row) { row.moves = largest; });
   const auto surely = [&](WatchedRow<S>& row) { row.times = S(4) * few; };
@@ -148,10 +147,10 @@ std::vector<WatchedRow<S>> watched_rows(S range, S middle, S gain, S half, S mem
       absurd,
       changed(moved(S(0.5), S(1)), remembered),
       absurd,
-      changed(moved(S(0.5), S(2)), [&](auto& row) { row.swings = swing; }),
+      changed(moved(S(0.5), S(2)), [&](auto& row) { row.oscillates = range; }),
       changed(moved(S(0.5), S(2)),
               [&](auto& row) {
-                row.swings = swing;
+                row.oscillates = range;
                 row.times = memory;
               }),
       absurd,
@@ -200,6 +199,12 @@ std::vector<WatchedRow<S>> watched_rows(S range, S middle, S gain, S half, S mem
   };
 }
 
+/// Samples in which the filters of a monitor settle, or a bound that is never reached in a row.
+template <class S>
+int bounded_samples(S samples) {
+  return static_cast<int>((std::min)(samples, S(1000000)));
+}
+
 /// The rows with what is found after each: the fault, and numbers of Health.
 /// @param range, middle of u @param step of the filters, per measurement @param memory samples
 /// @param late samples by which the disturbance is
@@ -207,7 +212,8 @@ template <class S, class Monitor, class Controller>
 std::vector<std::vector<S>> watched_self_test(Monitor monitor, const Controller& controller,
                                               S range, S middle, S step, S memory, int divider,
                                               int late, int most) {
-  const S half = std::ceil(S(S(4) / step)) * static_cast<S>(divider);
+  const S half =
+      static_cast<S>(bounded_samples(S(std::ceil(S(S(4) / step)) * static_cast<S>(divider))));
   const auto rows =
       watched_rows<S>(range, middle, S(controller.observer().input_gain()), half,
                       (std::min)(std::ceil(memory), S(20000)), static_cast<S>(divider));
@@ -225,7 +231,7 @@ std::vector<std::vector<S>> watched_self_test(Monitor monitor, const Controller&
                      row.moves,
                      row.disturbance,
                      row.beyond,
-                     row.swings,
+                     row.oscillates,
                      row.slope,
                      row.innovation,
                      row.status,
