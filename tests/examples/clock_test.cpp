@@ -108,6 +108,7 @@ TEST(Clock, AUnitIsRightOrAskedFor) {
       }
     }
   }
+  for (const auto* apart : {&usual, &odd}) of_rows(*apart, units[7], 2740087.47, "a month in min");
   std::printf("right %d, asked for %d, wrong with an alarm %d, bytes of seconds %d\n", all.right,
               all.asked, all.loud, all.same_bytes);
   EXPECT_LE(all.same_bytes, 4);

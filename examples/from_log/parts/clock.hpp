@@ -84,6 +84,7 @@ struct ClockRead {
   bool steady = true;    ///< no jitter: a grid, from which rows may be missing
   int more_digits = 0;   ///< that the first has, and the steps between rows have not
   bool rounded = false;  ///< steps differ by the last digit only
+  bool grid = true;      ///< steady, or jitter of the last digit
   double rounder = 0;    ///< s, of min, h or day: in this unit the numbers have fewer digits
 
   Pace pace = Pace::unknown;
@@ -231,11 +232,12 @@ inline double usual_step(const std::vector<double>& stamps) {
 }
 
 /// Whether stamps lie on a grid, from which some may be missing.
-inline bool is_steady(const std::vector<double>& stamps, double step) {
+/// @param digit the last of the file, by which they are rounded
+inline bool is_steady(const std::vector<double>& stamps, double step, double digit = 0) {
   std::size_t off = 0;
   for (std::size_t k = 1; k < stamps.size(); ++k) {
     const double steps = (stamps[k] - stamps[k - 1]) / step;
-    off += std::abs(steps - std::round(steps)) > 0.004 ? 1U : 0U;
+    off += std::abs(steps - std::round(steps)) > std::max(0.004, 1.1 * digit / step) ? 1U : 0U;
   }
   return 20 * off < stamps.size();
 }
@@ -254,12 +256,13 @@ inline ClockRead read_clock(const std::vector<double>& stamps, double origin, bo
                  .counter = counter,
                  .pace = pace};
   if (!(read.step > 0)) return read;
-  read.steady = is_steady(stamps, read.step);
+  read.steady = read.grid = is_steady(stamps, read.step);
   if (read.whole) return read;
   read.rounder = rounder_unit(numbers);
   const double grain = detail::grain_of(numbers, 1.0, 0.0);
   // Where double ends, digits are none of the file's.
   const double digit = std::max(grain, 4e-16 * std::abs(read.last));
+  read.grid = is_steady(stamps, read.step, digit);
   const double of_step = detail::grain_of({read.step}, 1.0, 0.05 * digit);
   const double off_grid = std::abs(std::remainder(read.first, of_step));
   while (off_grid > 0.5 * digit && read.more_digits < 9 &&
@@ -345,11 +348,12 @@ enum class Rows {
 inline Rows rows_of_date(const ClockRead& read, double unit, const std::vector<double>& clocks) {
   const double T = read.step * unit;
   if (unit > 86399) {  // some weeks in minutes are a date of a spreadsheet
-    if (!read.steady || chosen_part(T) || std::none_of(clocks.begin(), clocks.end(), [&](double c) {
-          return c > 1.5 && chosen_part(read.step * c);
-        }))
+    const auto counts = [&](double c) {
+      return c > 1.5 && (chosen_part(read.step * c) || three_digits(read.step * c));
+    };
+    if (!read.grid || chosen_part(T) || std::none_of(clocks.begin(), clocks.end(), counts))
       return Rows::usual;
-    return one_of(T, {90, 900, 1800, 3600}, 0.004) ? Rows::rare : Rows::of_counter;
+    return one_of(T, {90, 180, 900, 1800, 3600}, 0.004) ? Rows::rare : Rows::of_counter;
   }
   const bool by_the_clock = read.whole || !read.steady;
   if (T < 60.5 ||
